@@ -17,12 +17,9 @@ TYPES := build/types
 demo: $(VENV)/sim $(VENV)/code
 	$(BIN)/jointscope demo -o demo
 
-# The picture of the README: three effects are hidden, a quarter of an hour.
+# The picture of the README and its figures in docs/measured.md: three effects are hidden, a quarter of an hour.
 story: $(VENV)/sim $(VENV)/code
-	mkdir -p demo
-	$(BIN)/jointscope demo -o demo/story --seconds 20 --effect load_dependent_friction@joint2:coefficient=0.25 \
-		--effect cogging@joint1:cos=0.5,sin=0.4,order=42.092 --effect backlash@joint3:half_gap=0.01
-	cp demo/story/story.svg docs/pictures/story.svg
+	$(BIN)/python benchmarks/bench_story.py
 
 # One process a core, each with one thread of linear algebra; a file's tests stay together, as they share recordings.
 PYTEST := OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 $(BIN)/python -m pytest --numprocesses auto --dist loadfile

@@ -61,3 +61,19 @@ def test_pages_show_what_their_commands_draw(name):
 def test_links_lead_somewhere(page):
     for link in re.findall(r"\]\(([^)#:]+)(?:#[^)]*)?\)", text_of(page)):
         assert (page.parent / link).exists(), link
+
+
+def test_the_figures_of_the_story_are_those_that_its_benchmark_wrote():
+    section = re.search(
+        r"<!-- bench_story -->(.*?)<!-- end of bench_story -->", text_of(ROOT / "docs/measured.md"), re.DOTALL
+    )
+    assert section
+    steps = [line.strip("| ").split() for line in section[1].splitlines() if re.match(r"\| (base|\+|-) ", line)]
+    errors = [[float(cell) for cell in step if re.fullmatch(r"[\d.]+", cell)] for step in steps]
+    words = " ".join(text_of(ROOT / "README.md").split())
+    said = re.search(
+        r"error falls from ([\d.]+) to ([\d.]+) sensor sigmas, where noise alone would leave (\d+\.\d+)", words
+    )
+    assert said and [float(figure) for figure in said.groups()] == [errors[0][1], errors[-1][1], errors[-1][2]]
+    drawn = re.findall(r">([\d.]+) σ<", text_of(ROOT / "docs/pictures/story.svg"))
+    assert list(map(float, drawn)) == [figure for step in errors for figure in step[:2]]

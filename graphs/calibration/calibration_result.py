@@ -22,13 +22,14 @@ from jointscope.graphs.starts.drive_regression import Value
 from jointscope.robots.model.lasting_torques import lasting_torques
 from jointscope.robots.model.robot import Robot
 from jointscope.robots.parts.process_noise import ProcessNoise
+from jointscope.robots.parts.shown_value import ShownValue
 from jointscope.robots.recordings.recording import Recording
 
 Array = NDArray[np.float64]
 
 
-@dataclass(frozen=True)
-class ParameterEstimate:
+@dataclass(frozen=True, repr=False)
+class ParameterEstimate(ShownValue):
     """One calibrated number.
 
     Attributes:
@@ -52,6 +53,11 @@ class ParameterEstimate:
     published: float | None = None
     note: str = ""
     derived: bool = False
+
+    @property
+    def remark(self) -> str:
+        """The note."""
+        return self.note
 
 
 @dataclass(frozen=True)
@@ -251,7 +257,8 @@ class CalibrationResult:
             "parameters": self._json_parameters(),
             "weak_directions": [{"parameters": d.weights, "sigma": d.sigma} for d in self.weak_directions],
             "channels": {
-                name: {"rmse": fit.rmse, "sigma": fit.sigma, "chi2": fit.chi2} for name, fit in self.channels.items()
+                name: {"rmse": fit.rmse, "sigma": fit.sigma, "chi2": fit.chi2, "unit": fit.unit}
+                for name, fit in self.channels.items()
             },
             "noise": {}
             if self.robot.free_links

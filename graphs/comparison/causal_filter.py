@@ -9,7 +9,8 @@ what reaches on to later states,
 which is quick, but linearised around smoothed states: the future has a small say. `filter_states` is an extended Kalman
 filter in information form, linearised around its own past. A guess of its means gives all its linear steps at once,
 these give better means, and what stays the same is the filter. Where that does not settle, it runs tick by tick, many
-pieces of the recording side by side, each started early enough to forget where it began.
+pieces of the recording side by side, each started early enough to forget where it began, and where most is known: a
+link that rests somewhere in its backlash is anywhere in it, and linear steps from there may learn a side that is wrong.
 """
 
 from __future__ import annotations
@@ -121,8 +122,7 @@ def _linear_steps(
 def _tick_by_tick(problem: BagProblem, begin: FilteredStates, calibration: Calibration) -> FilteredStates:
     m, h = len(begin.mean), float(np.median(problem.timeline.h))
     piece, early = max(int(PIECE / h), 1), int(BURN_IN / h)
-    first = np.arange(0, m, piece)
-    start = np.maximum(first - early, 0)
+    start = _starts(begin, np.arange(0, m, piece), early)
     mean, covariance = begin.mean.copy(), begin.covariance.copy()
     run = _Run(problem, calibration, begin.mean[start], _inverse(begin.covariance[start]), start)
     for _ in range(piece + early - 1):
@@ -130,10 +130,20 @@ def _tick_by_tick(problem: BagProblem, begin: FilteredStates, calibration: Calib
         if not np.any(alive):
             break
         run = run.keep(alive).advance()
-        wanted = run.tick >= run.owner * piece
+        wanted = run.tick // piece == run.owner
         mean[run.tick[wanted]] = run.mean[wanted]
         covariance[run.tick[wanted]] = _inverse(run.information[wanted])
     return FilteredStates(mean, covariance)
+
+
+def _starts(begin: FilteredStates, first: NDArray[np.intp], early: int) -> NDArray[np.intp]:
+    """Where each run starts: the tick at which most is known in the first half of what it may run before its piece."""
+    with np.errstate(invalid="ignore"):  # rounding may leave a covariance that is none; no run starts there
+        balanced, scale = _balanced(begin.covariance)
+        spread = np.linalg.slogdet(balanced)[1] - 2.0 * np.log(scale).sum(axis=1)  # logarithm of the determinant
+    spread = np.where(np.isfinite(spread), spread, np.inf)
+    sooner, later = np.maximum(first - early, 0), np.maximum(first - early // 2, 0)
+    return np.array([a + int(np.argmin(spread[a : b + 1])) for a, b in zip(sooner, later, strict=True)], dtype=np.intp)
 
 
 def filter_around(problem: BagProblem, x: Array, calibration: Calibration) -> FilteredStates:

@@ -146,7 +146,12 @@ class ModelComparison:
             "error": self.error,
             "floor": self.floor,
             "channels": {
-                name: {"horizons": dict(c.horizons), "fit_percent": c.fit_percent, "noise_sigma": c.noise_sigma}
+                name: {
+                    "horizons": dict(c.horizons),
+                    "fit_percent": c.fit_percent,
+                    "noise_sigma": c.noise_sigma,
+                    "unit": c.unit,
+                }
                 for name, c in self.channels.items()
             },
             "worst": [{"channel": w.channel, "t0": w.t0, "t1": w.t1, "share": w.share} for w in self.worst],

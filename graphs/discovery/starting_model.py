@@ -69,8 +69,8 @@ def _refuse_mistaken(robot: Robot, recording: Recording) -> None:
         if notice.kind in REFUSED:
             instead = "" if notice.kind == MISTAKEN_TRANSMISSION else f", or leave {notice.stream} out of it"
             raise RecordingError(
-                f"{recording.path}: {notice.text}; no effect can be told beside that: correct the robot file{instead}, "
-                "then search again"
+                f"{recording.path}: {notice.text}; no effect can be identified beside that: correct the robot "
+                f"file{instead}, then search again"
             )
 
 

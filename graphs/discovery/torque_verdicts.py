@@ -25,7 +25,7 @@ from jointscope.robots.units import of_slide
 
 UNHELD = "a calibration with it does not bear it out"
 NUMERICS = "it is a choice of the computation, which torques averaged over many steps do not tell"
-BEHIND = "torques averaged over many steps do not tell it behind a spring whose link no sensor sees"
+BEHIND = "torques averaged over many steps do not show it behind a spring whose link no sensor sees"
 TIED = 0.01  # of a score: less says nothing
 # a constant before friction that knows directions, which it is while a joint moves, and before a weight on a slide
 SIMPLEST = (

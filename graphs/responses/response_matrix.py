@@ -162,7 +162,7 @@ def _about_neighbours(G: Complex, sizes: Array) -> Complex:
     n, width = len(G), 2 * NEIGHBOURS + 1
     if n < width:
         raise RecordingError(
-            f"{n} lines and one realisation do not tell a covariance; record another realisation of the phases"
+            f"{n} lines and one realisation do not determine a covariance; record another realisation of the phases"
         )
     flat = G.reshape(n, -1)
     found = np.zeros((n, flat.shape[1], flat.shape[1]), dtype=complex)

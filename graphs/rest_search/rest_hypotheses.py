@@ -57,7 +57,7 @@ def _why_silent(robot: Robot, hypothesis: EffectHypothesis) -> str:
     if isinstance(effect, ReadingEffect) and owner.removesuffix(LINK_SIDE) not in robot.joints:
         return "its sensor is not read at rest"
     if isinstance(effect, JointTorque) and effect.memory is not None:
-        return "depends on how a joint came to rest, which rests do not tell"
+        return "depends on how a joint came to rest, which rests do not show"
     if isinstance(effect, JointTorque) and effect.side == "link" and _is_dry(effect, hypothesis):
         return "would hold a link away from equilibrium, at which rests take all links"
     return ""

@@ -88,7 +88,11 @@ class RestErrors:
     def to_json(self, robot: Robot) -> dict[str, Any]:
         """By channel of the link encoders, and torques by joint."""
         return {
-            f"{joint}.link_position": {"rmse": _rms(self.position[:, i]), "chi2": _rms(self.residual[:, i]) ** 2}
+            f"{joint}.link_position": {
+                "rmse": _rms(self.position[:, i]),
+                "chi2": _rms(self.residual[:, i]) ** 2,
+                "unit": robot.unit_at(joint, "rad"),
+            }
             for i, joint in enumerate(robot.joints)
         }
 

@@ -53,7 +53,7 @@ def on_their_word(robot: Robot, found: Mapping[str, Value]) -> list[str]:
     if not untold or not any(f"{joint}.inertia" in found for joint in untold):
         return []
     return [
-        f"nothing in the recording tells that the commands of {', '.join(untold)} are torques in their unit (no weight "
+        f"nothing in the recording shows that the commands of {', '.join(untold)} are torques in their unit (no weight "
         "changes there): the values are in proportion to them"
     ]
 

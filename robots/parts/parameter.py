@@ -6,9 +6,11 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
+from jointscope.robots.parts.shown_value import ShownValue
 
-@dataclass(frozen=True)
-class Parameter:
+
+@dataclass(frozen=True, repr=False)
+class Parameter(ShownValue):
     """A scalar parameter OWNER.NAME of a robot.
 
     Positive parameters are estimated as logarithms, so they cannot change sign; their prior sigma is then
@@ -44,6 +46,11 @@ class Parameter:
     def owner(self) -> str:
         """What the parameter belongs to: "motor", "joint1", "imu2"."""
         return self.name.split(".", 1)[0]
+
+    @property
+    def remark(self) -> str:
+        """Whether calibration leaves it alone."""
+        return "fixed" if self.fixed else ""
 
     @property
     def coordinate_sigma(self) -> float:

@@ -15,6 +15,7 @@ from fnmatch import fnmatchcase
 from types import MappingProxyType
 from typing import Any
 
+from jointscope.robots.parts.parameter import Parameter
 from jointscope.robots.yaml_section import did_you_mean
 from jointscope.tools.acceptance.limits import RANGES, Limit
 
@@ -24,7 +25,7 @@ CERTAIN = 2.0  # sigma
 TABLES = {"parameter": "parameters", "channel": "channels", "joint": "missing_torque_percent"}
 """Where in the JSON the names of a subject stand."""
 NO_TORQUE = (
-    "this result says nothing of missing_torque_percent: `jointscope diagnose` finds it where encoders on rigid joints "
+    "this result has no missing_torque_percent: `jointscope diagnose` finds it if encoders on rigid joints "
     "tell torques; elsewhere models are judged by predictions, which `channel` with a `horizon` limits"
 )
 
@@ -64,6 +65,7 @@ class _Found:
     unit: str = ""
     sigma: float = 0.0
     missing: str = ""
+    remark: str = ""
 
 
 AcceptedBy = Mapping[str, Sequence[Checked]]
@@ -120,7 +122,7 @@ def _check(limit: Limit, content: Mapping[str, Any]) -> Iterator[Checked]:
         return
     table = content.get(TABLES[limit.subject])
     if not table:
-        nothing = f"this result says nothing of {TABLES[limit.subject]}"
+        nothing = f"this result has no {TABLES[limit.subject]}"
         yield Checked(limit, limit.pattern, OPEN, NO_TORQUE if limit.subject == "joint" else nothing)
         return
     names = [name for name in table if fnmatchcase(name, limit.pattern)]
@@ -134,13 +136,22 @@ def _check(limit: Limit, content: Mapping[str, Any]) -> Iterator[Checked]:
 def _judged(limit: Limit, name: str, found: _Found) -> Checked:
     if found.missing:
         return Checked(limit, name, OPEN, found.missing)
-    spread = CERTAIN * found.sigma
-    text = f"{found.value:.6g} {found.unit}".rstrip() + (f" ± {found.sigma:.2g}" if found.sigma else "")
-    if not limit.lower <= found.value <= limit.upper:
+    factor = limit.factor_from(found.unit)
+    if factor is None:
+        return Checked(limit, name, OPEN, f"it is in {found.unit or 'no unit'}, the limit {_in(limit.unit)}")
+    value, spread, unit = factor * found.value, CERTAIN * factor * found.sigma, limit.unit or found.unit
+    text = f"{value:.6g} {'' if unit == '1' else unit}".rstrip()
+    text += f" ± {factor * found.sigma:.2g}" if found.sigma else ""
+    text += f", {found.remark}" if found.remark else ""
+    if not limit.lower <= value <= limit.upper:
         return Checked(limit, name, FAIL, text)
-    if found.value - spread < limit.lower or found.value + spread > limit.upper:
+    if value - spread < limit.lower or value + spread > limit.upper:
         return Checked(limit, name, OPEN, f"{text}: two sigma reach beyond the limit")
     return Checked(limit, name, PASS, text)
+
+
+def _in(unit: str) -> str:
+    return f"in {unit}" if unit else "has no unit"
 
 
 def _of_parameter(limit: Limit, name: str, entry: Mapping[str, Any]) -> _Found:
@@ -154,12 +165,27 @@ def _of_parameter(limit: Limit, name: str, entry: Mapping[str, Any]) -> _Found:
     if limit.quantity.startswith("sigma"):
         return _share(sigma, value, unit, limit.quantity)
     assert limit.earlier is not None
-    if name not in limit.earlier:
-        return _Found(missing=f"{limit.against} has no such parameter")
-    before = limit.earlier[name]
-    moved = _share(abs(value - before), before, unit, limit.quantity)
-    spread = _share(sigma, before, unit, limit.quantity)
-    return moved if moved.missing else _Found(moved.value, moved.unit, spread.value)
+    before = limit.earlier.get(name)
+    if before is None or before.unit != unit:
+        return _Found(missing=f"{limit.against} has no such parameter{'' if before is None else f' in {unit}'}")
+    return _drift(limit.quantity, before, value, sigma)
+
+
+def _drift(quantity: str, before: Parameter, value: float, sigma: float) -> _Found:
+    """How far a value has moved, with the sigmas of both.
+
+    What both have in common, priors and the masses of the URDF, cancels in the difference, and so would noise of
+    recordings that both were found from: the sigma of independent values is the larger one.
+    """
+    was, past = before.value, before.sigma or 0.0
+    moved = _share(abs(value - was), was, before.unit, quantity)
+    if moved.missing:
+        return moved
+    relative = quantity.endswith("_percent")
+    spread = 100.0 * math.hypot(sigma, past * value / was) / abs(was) if relative else math.hypot(sigma, past)
+    said = f"{was:.6g} ± {past:.2g}" if past else f"{was:.6g} (no sigma: taken as exact)"
+    remark = f"from {said} to {value:.6g} ± {sigma:.2g} {before.unit}"
+    return replace(moved, sigma=spread, remark=remark)
 
 
 def _share(part: float, whole: float, unit: str, quantity: str) -> _Found:
@@ -176,10 +202,10 @@ def _of_channel(limit: Limit, _: str, entry: Mapping[str, Any]) -> _Found:
             known = f"; horizons are {', '.join(horizons)}" if horizons else "; `jointscope compare` has it"
             asked = "in the open loop" if limit.horizon == "open_loop" else f"{limit.horizon} s ahead"
             return _Found(missing=f"this result has no error {asked}{known}")
-        return _number(horizons[limit.horizon])
+        return _number(horizons[limit.horizon], entry.get("unit", ""))
     if limit.quantity not in entry:
         return _Found(missing=f"this result has no {limit.quantity}; `jointscope calibrate` has it")
-    return _number(entry[limit.quantity])
+    return _number(entry[limit.quantity], "1" if limit.quantity == "chi2" else entry.get("unit", ""))
 
 
 def _of_joint(_: Limit, name: str, entry: float | None) -> _Found:
@@ -194,7 +220,7 @@ def _of_poses(limit: Limit, content: Mapping[str, Any]) -> _Found:
     worst = max(known) if known and len(known) == len(values) else None
     unit = limit.quantity.rpartition("_")[2]
     what = "poses" if unit == "mm" else "orientations of poses"
-    return _number(worst, unit, f"this result says nothing of {what}")
+    return _number(worst, unit, f"this result has no {what}")
 
 
 def _number(value: Any, unit: str = "", otherwise: str = "it is no number") -> _Found:

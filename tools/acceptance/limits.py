@@ -2,26 +2,31 @@
 """A file of limits: what must hold of a parameter, a channel, a joint or poses, and why.
 
     limits:
-      - {parameter: joint1.stiffness, between: [180, 200], because: data sheet of the belt}
+      - {parameter: joint1.stiffness, between: [180, 200 N m/rad], because: data sheet of the belt}
       - {parameter: "*.coulomb_torque", sigma_percent: 2, because: the feed-forward needs it}
       - {parameter: joint1.stiffness, drift_percent: 5, against: january.yaml, because: belt set in January}
-      - {channel: "imu1.*", horizon: 0.1, error: 0.02, because: balance controller}
+      - {channel: "imu1.*", horizon: 0.1, error: 1 deg/s, because: balance controller}
 
-Names may hold `*`; the quantity and its bound are the one key that is left.
+Names may hold `*`; the quantity and its bound are the one key that is left. A bound has a unit unless it is a pure
+number or the quantity names its unit: nothing must pass because it was meant in another one.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from jointscope.robots.errors import RobotError
 from jointscope.robots.files.robot_file import load_robot
+from jointscope.robots.parts.parameter import Parameter
+from jointscope.robots.unit_text import unit_factor
 from jointscope.robots.yaml_document import read_document
 from jointscope.robots.yaml_section import Section, did_you_mean
+from jointscope.tools.acceptance.bounds import read_bounds
 
 BESIDE = ("because", "horizon", "against")  # keys that say more of a limit
 RANGES = ("between", "at_most", "at_least")
@@ -32,6 +37,12 @@ QUANTITIES: Mapping[str, tuple[str, ...]] = {
     "poses": ("mean_mm", "p90_mm", "max_mm", "rms_mm", "mean_mrad", "p90_mrad", "max_mrad", "rms_mrad"),
 }
 """What can be limited, by what it is of."""
+_OWN_UNITS = {"percent": "%", "mm": "mm", "chi2": "1"}
+
+
+def own_unit(quantity: str) -> str | None:
+    """The unit that the last word of a quantity says, if it says one."""
+    return _OWN_UNITS.get(quantity.rsplit("_", 1)[-1])
 
 
 @dataclass(frozen=True)
@@ -42,11 +53,13 @@ class Limit:
         subject: a key of QUANTITIES.
         pattern: names that it is about; `*` stands for anything.
         quantity: what is limited.
-        lower, upper: bounds, in the unit of the quantity.
+        lower, upper: bounds, in `unit`.
         reason: why, in the user's words.
+        unit: of the bounds; empty where they are pure numbers.
         horizon: of the prediction whose error is limited, as JSON has it ("0.1", "open_loop"); empty for others.
-        earlier: values of an earlier robot by parameter, where a drift is limited.
+        earlier: parameters of an earlier robot by name, where a drift is limited.
         against: the file of that robot.
+        place: where it stands, for messages: "limits.yaml: limits[2]".
     """
 
     subject: str
@@ -55,20 +68,45 @@ class Limit:
     lower: float
     upper: float
     reason: str
+    unit: str = ""
     horizon: str = ""
-    earlier: Mapping[str, float] | None = None
+    earlier: Mapping[str, Parameter] | None = None
     against: str = ""
+    place: str = ""
+
+    @property
+    def in_own_unit(self) -> bool:
+        """Whether the name of the quantity says its unit."""
+        return own_unit(self.quantity) is not None
+
+    def factor_from(self, unit: str) -> float | None:
+        """What a value in `unit` is multiplied by to be one in the unit of the bounds; None if that does not fit."""
+        only_zero = not self.unit and all(b == 0.0 or np.isinf(b) for b in (self.lower, self.upper))
+        return 1.0 if only_zero else unit_factor(unit or "1", self.unit or "1")
+
+    def misfit(self, unit: str, name: str = "") -> str:
+        """The message for bounds whose unit does not fit what is limited, of that name, which is in `unit`."""
+        bound = self.upper if np.isfinite(self.upper) and self.upper else self.lower
+        got = f"{bound:g} {self.unit}" if self.unit else f"{bound:g} without a unit"
+        of = f"{self.quantity} of {name}" if name else self.quantity
+        return f"{self.place}: {of} is in {unit}; expected a bound in such a unit, as '{bound:g} {unit}', got {got!r}"
+
+    @property
+    def bounds(self) -> str:
+        """The bounds in words: "between 180 and 200 N m/rad"."""
+        unit = f" {self.unit}" if self.unit not in ("", "1") else ""
+        if np.isfinite(self.lower) and np.isfinite(self.upper):
+            return f"between {self.lower:g} and {self.upper:g}{unit}"
+        side, bound = ("at least", self.lower) if np.isfinite(self.lower) else ("at most", self.upper)
+        return f"{side} {bound:g}{unit}"
 
     @property
     def text(self) -> str:
-        """The line in words: "joint1.stiffness between 180 and 200"."""
+        """The line in words: "joint1.stiffness between 180 and 200 N m/rad"."""
         what = "" if self.quantity in RANGES else f" {self.quantity}"
         what += f" {self.horizon} s ahead" if self.horizon not in ("", "open_loop") else f" {self.horizon}".rstrip()
         what += f" against {self.against}" if self.against else ""
-        if np.isfinite(self.lower) and np.isfinite(self.upper):
-            return f"{self.pattern}{what} between {self.lower:g} and {self.upper:g}"
-        side, bound = ("at least", self.lower) if np.isfinite(self.lower) else ("at most", self.upper)
-        return f"{self.pattern}{what} {side} {bound:g}"
+        return f"{self.pattern}{what} {self.bounds}"
 
 
 def read_limits(path: Path) -> tuple[Limit, ...]:
@@ -92,18 +130,41 @@ def _limit(section: Section, folder: Path) -> Limit:
     subject = _only_key(section, tuple(QUANTITIES), "what the limit is of")
     pattern = section.text(subject)
     quantity = _only_key(section, QUANTITIES[subject], f"what is limited of a {subject}")
-    lower, upper = _BOUNDS.get(quantity, _at_most)(section, quantity)
+    lower, upper, unit = read_bounds(section, quantity)
+    limit = Limit(subject, pattern, quantity, lower, upper, _reason(section), unit, place=section.place)
+    if quantity == "error":
+        limit = replace(limit, horizon=_horizon(section))
+    if quantity.startswith("drift"):
+        limit = replace(limit, **_earlier(section, folder))
+    return _with_own_unit(limit)
+
+
+def _reason(section: Section) -> str:
     reason = section.text("because")
     if not reason.strip():
         raise RobotError(f"{section.place}: because: expected the reason for this limit, got an empty text")
-    horizon = _horizon(section) if quantity == "error" else ""
-    if not quantity.startswith("drift"):
-        return Limit(subject, pattern, quantity, lower, upper, reason, horizon)
+    return reason
+
+
+def _earlier(section: Section, folder: Path) -> dict[str, Any]:
+    """The robot that a drift is measured from."""
     against = section.text("against")
     beside = folder / against
-    robot = load_robot(beside if beside.is_file() else against)
-    earlier = {name: parameter.value for name, parameter in robot.parameters.items()}
-    return Limit(subject, pattern, quantity, lower, upper, reason, horizon, earlier, against)
+    return {"earlier": load_robot(beside if beside.is_file() else against).parameters, "against": against}
+
+
+def _with_own_unit(limit: Limit) -> Limit:
+    """With the unit that the quantity's name says; complains about another, and about percents of an absolute one."""
+    own = own_unit(limit.quantity)
+    if own is not None and not limit.unit:
+        return replace(limit, unit=own)
+    if own is not None and limit.factor_from(own) is None:
+        raise RobotError(limit.misfit(own))
+    if limit.quantity in ("sigma", "drift") and limit.unit == "%":
+        raise RobotError(
+            f"{limit.place}: {limit.quantity}: of percents write `{limit.quantity}_percent: {limit.upper:g}`"
+        )
+    return limit
 
 
 def _only_key(section: Section, known: tuple[str, ...], what: str) -> str:
@@ -122,21 +183,3 @@ def _horizon(section: Section) -> str:
     if value == "open_loop":
         return "open_loop"
     return f"{float(section.number('horizon', positive=True))}"
-
-
-def _between(section: Section, key: str) -> tuple[float, float]:
-    lower, upper = section.array(key, (2,))
-    if lower > upper:
-        raise RobotError(f"{section.place}: {key}: expected [lowest, highest], got [{lower:g}, {upper:g}]")
-    return float(lower), float(upper)
-
-
-def _at_most(section: Section, key: str) -> tuple[float, float]:
-    return -np.inf, section.number(key)
-
-
-def _at_least(section: Section, key: str) -> tuple[float, float]:
-    return section.number(key), np.inf
-
-
-_BOUNDS: Mapping[str, Callable[[Section, str], tuple[float, float]]] = {"between": _between, "at_least": _at_least}

@@ -46,7 +46,7 @@ def need_masses(robot: Robot) -> None:
     if robot.free_links:
         raise RobotError(
             f"{robot.name} has link_dynamics: free, so its masses are not known, and a URDF or MuJoCo model of motion "
-            f"needs them; what was calibrated (springs, delays, zeros) stands in {robot.path.name}"
+            f"needs them; what was calibrated (springs, delays, zeros) is in {robot.path.name}"
         )
     robot.need_link_dynamics()
 

@@ -71,7 +71,7 @@ def calibrate(
         poses: tables or bags of the arm at rest with a measured target, for the same estimate.
         frequency: bags in which the arm is shaken, one for each pose, for the same estimate.
         sets: recordings of other kinds that you have made yourself, for the same estimate.
-        accept: limits that the result must keep (docs/accept.md); `result.accepted` says whether it does.
+        accept: limits that the result must meet (docs/accept.md); `result.accepted` says whether it does.
         leave_out: stretches in which something acted that does not belong to the robot: (t0, t1) [s] of the only
             recording, or "BAG:T0:T1" as on the command line.
         biases_only: leave dynamics and mountings as they are.
@@ -82,7 +82,8 @@ def calibrate(
         RecordingError: a recording cannot be a measurement of this robot, or does not move a joint.
         SolveError: no convergence, or a value that nothing determines.
     """
-    model, limits = robot_of(robot), limits_of(accept)
+    model = robot_of(robot)
+    limits = limits_of(accept, [model])
     if isinstance(recordings, Sequence) and not recordings and (rests or poses or frequency):
         raise RecordingError(
             "no recording of motion is given; from poses alone call calibrate_poses(robot, [read_poses(path, robot)]), "
@@ -123,14 +124,15 @@ def compare(
         recording: one that no model was fitted to.
         leave_out: stretches in which something acted that does not belong to the robot: (t0, t1) [s] of the only
             recording, or "BAG:T0:T1" as on the command line.
-        accept: limits that each model must keep (docs/accept.md); `result.accepted` says whether they do.
+        accept: limits that each model must meet (docs/accept.md); `result.accepted` says whether they do.
         progress: called with a text and the share done, from 0 to 1.
 
     Raises:
         RobotError: two robots have the same name and no labels, or read different topics.
         RecordingError: the recording cannot be a measurement of these robots.
     """
-    models, limits = labelled(robots), limits_of(accept)
+    models = labelled(robots)
+    limits = limits_of(accept, models.values())
     check_same_streams(models)
     first = next(iter(models.values()))
     (read_one,) = without_stretches(recordings_of([recording], first), leave_out)
@@ -158,7 +160,7 @@ def diagnose(
         leave_out: stretches in which something acted that does not belong to the robot: (t0, t1) [s] of the only
             recording, or "BAG:T0:T1" as on the command line.
         missing_torque: estimate the torque that the model lacks, for the pictures.
-        accept: limits that the model must keep (docs/accept.md); `result.accepted` says whether it does.
+        accept: limits that the model must meet (docs/accept.md); `result.accepted` says whether it does.
         side_by_side: processes that fit the candidates; this one alone if not given.
         progress: called with a text and the share done, from 0 to 1.
 
@@ -166,8 +168,9 @@ def diagnose(
         RecordingError: a recording cannot be a measurement of this robot.
         SolveError: the base model cannot be calibrated.
     """
-    limits = limits_of(accept)
-    model, learnt, held = to_learn_from(robot, recordings, holdout, leave_out)
+    given = robot_of(robot)
+    limits = limits_of(accept, [given])
+    model, learnt, held = to_learn_from(given, recordings, holdout, leave_out)
     if model.free_links:
         found = diagnose_links(model, learnt, held, progress=progress)
     else:

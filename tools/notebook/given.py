@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from numbers import Real
 from pathlib import Path
 
@@ -14,6 +14,7 @@ from jointscope.robots.files.robot_file import load_robot
 from jointscope.robots.model.robot import Robot
 from jointscope.robots.recordings.recording import Recording
 from jointscope.tools.acceptance.limits import Limit, read_limits
+from jointscope.tools.acceptance.units import check_units
 from jointscope.tools.bags.read_recording import read_recording
 from jointscope.tools.presentation.left_out import leave_out as leave_out_texts
 from jointscope.tools.simulator.simulation import Simulation
@@ -132,15 +133,16 @@ def _told(thing: object) -> str:
     return f"{type(thing).__name__} {thing!r}" if isinstance(thing, int | float | str) else type(thing).__name__
 
 
-def limits_of(limits: AnyLimits) -> tuple[Limit, ...]:
+def limits_of(limits: AnyLimits, robots: Iterable[Robot]) -> tuple[Limit, ...]:
     """The lines of a file of limits, or those given.
 
     Raises:
-        RobotError: the file has a mistake.
+        RobotError: the file has a mistake, or a bound is in another unit than what it limits.
     """
     if isinstance(limits, str | Path):
-        return read_limits(Path(limits))
+        limits = read_limits(Path(limits))
     for line in limits if isinstance(limits, Sequence) else (limits,):
         if not isinstance(line, Limit):
             raise RobotError(f"accept: expected the path of a file of limits, or a list of Limit, got {_told(line)}")
+    check_units(limits, robots)
     return tuple(limits)

@@ -15,8 +15,9 @@ from jointscope.graphs.discovery.diagnosis_result import Diagnosis
 from jointscope.graphs.discovery.discovery_result import Discovery
 from jointscope.graphs.fixed_lag.replay.replay_result import ReplayResult
 from jointscope.graphs.fixed_lag.window.state_names import state_names
-from jointscope.robots.errors import JointscopeError, RobotError
+from jointscope.robots.errors import JointscopeError
 from jointscope.tools.acceptance.evaluation import FAIL, OPEN, PASS, AcceptedBy
+from jointscope.tools.notebook.parameters import Parameters
 from jointscope.tools.notebook.shown import Row, Shown
 from jointscope.tools.presentation.model_answer import diagnosis_answer, discovery_answer
 from jointscope.tools.presentation.numbers import significant
@@ -64,7 +65,11 @@ class _Limited(_Found):
 
 @dataclass(frozen=True)
 class Calibrated(_Limited, CalibrationResult):
-    """A calibration; `result["joint1.stiffness"]` is one of its parameters."""
+    """A calibration; `result["joint1.stiffness"]` is one of its parameters or derived results."""
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "parameters", Parameters(self.parameters))  # the dataclass is frozen
+        object.__setattr__(self, "derived", Parameters(self.derived))
 
     def __getitem__(self, name: str) -> ParameterEstimate:
         """A parameter or a derived result by its name.
@@ -72,10 +77,8 @@ class Calibrated(_Limited, CalibrationResult):
         Raises:
             RobotError: there is none of that name.
         """
-        found = {p.name: p for p in (*self.parameters, *self.derived)}
-        if name not in found:
-            raise RobotError(f"{self.robot.name} has no parameter {name}; it has {', '.join(found)}")
-        return found[name]
+        found: ParameterEstimate = Parameters((*self.parameters, *self.derived))[name]
+        return found
 
     @cached_property
     def judgement(self) -> Judgement:

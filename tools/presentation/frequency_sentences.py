@@ -39,7 +39,7 @@ def sticking(result: FrequencyCalibration) -> list[str]:
         return []
     joints = ", ".join(name.split(".")[0] for name in ends)
     return [
-        f"friction of {joints} turns over faster than the velocities tell ({SHARPNESS}); if it sticks, which the model "
+        f"friction of {joints} turns over faster than the velocities show ({SHARPNESS}); if it sticks, which the model "
         "does not know, springs are further off than their sigmas say"
     ]
 
@@ -61,7 +61,7 @@ def kinds_sentences(result: KindsCalibration) -> list[str]:
     """Agreement first, then the sums of squares."""
     found, (alone, joint) = result.agreement, result.pose_squares
     how = "contradict each other" if found.doubtful else "agree"
-    test = f"chi-square {significant(found.chi2, 3)} for {found.dof} directions that both tell, p = "
+    test = f"chi-square {significant(found.chi2, 3)} for {found.dof} directions that both determine, p = "
     lines = [f"poses and frequency responses {how}: {test}{significant(found.p_value, 2)}"]
     if found.doubtful:
         lines.append(

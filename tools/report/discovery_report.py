@@ -85,7 +85,7 @@ def _later_diagnoses(result: Discovery) -> list[Section]:
     if not diagnosed:
         return []
     body = "".join(foldable(f"after step {k}: {step.label}", _later(step, k)) for k, step in diagnosed)
-    lead = "The same questions again, asked of the models that came later; the last one shows what is left over."
+    lead = "The same questions for the later models; the last one shows what is left over."
     return [Section("later", "What was left after each step", body, lead)]
 
 

@@ -34,7 +34,7 @@ def frequency_comparison_report(
     sections = [
         Section("errors", "How far off", table(ERROR_HEAD, _escaped(error_rows(by_label)), (3, 4, 5)), ERRORS),
         Section(
-            "balance", "What the torques tell", table(BALANCE_HEAD, _escaped(balance_rows(by_label)), (3, 4)), LEFT
+            "balance", "What the torques show", table(BALANCE_HEAD, _escaped(balance_rows(by_label)), (3, 4)), LEFT
         ),
         *acceptance(checked),
         *(_pose(by_label, k) for k in range(len(first))),

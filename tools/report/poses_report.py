@@ -135,7 +135,7 @@ def _values(result: PoseCalibration) -> Section:
         p = result.robot.parameters[name]
         factor, unit = (1e3, "mm" if p.unit == "m" else "mrad") if p.unit in ("m", "rad") else (1.0, p.unit)
         value, sigma = with_sigma(factor * p.value, factor * (p.sigma or 0.0))
-        told = "" if name in result.told else "not told by these poses"
+        told = "" if name in result.told else "not determined by these poses"
         rows.append([escape(name), value, sigma, escape(unit), told])
     lead = (
         "Standard deviations include what transmissions do unseen. Geometric errors that look alike share their values."
@@ -146,4 +146,4 @@ def _values(result: PoseCalibration) -> Section:
 def _silent(result: PoseCalibration) -> Section:
     items = "".join(f"<li>{escape(combination_text(weights))}</li>" for weights in result.determined.combinations)
     lead = f"{result.determined.rank} combinations of geometric errors are determined; these move no target:"
-    return Section("silent", "What poses cannot tell", f"<ul>{items}</ul>", lead)
+    return Section("silent", "What these poses cannot determine", f"<ul>{items}</ul>", lead)

@@ -8,7 +8,7 @@ import textwrap
 from jointscope.tools.simulator.effects import simulated_effects
 
 HEADINGS = {
-    "catalogue": "effects that the catalogue knows, by owner",
+    "catalogue": "effects of the catalogue, by owner",
     "outside": "effects outside the catalogue: a diagnosis should say that something is left",
     "mistake": "not physics, but mistakes in the bag",
 }

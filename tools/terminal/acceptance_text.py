@@ -13,10 +13,10 @@ def acceptance_answer(checked: Sequence[Checked]) -> str:
     """Accepted, not accepted or undecided, and by how many limits."""
     count = {outcome: sum(line.outcome == outcome for line in checked) for outcome in (FAIL, OPEN)}
     if count[FAIL]:
-        return f"Not accepted: {count[FAIL]} of {len(checked)} limits are not kept."
+        return f"Not accepted: {count[FAIL]} of {len(checked)} limits failed."
     if count[OPEN]:
-        return f"Undecided: {count[OPEN]} of {len(checked)} limits could not be evaluated; nothing failed."
-    return f"Accepted: all {len(checked)} limits are kept."
+        return f"Undecided: {count[OPEN]} of {len(checked)} limits could not be evaluated; none failed."
+    return f"Accepted: {f'all {len(checked)} limits are' if len(checked) > 1 else 'the limit is'} met."
 
 
 def acceptance_text(checked: AcceptedBy) -> str:

@@ -4,10 +4,13 @@
 from __future__ import annotations
 
 import argparse
+from collections.abc import Iterable
 from pathlib import Path
 
+from jointscope.robots.model.robot import Robot
 from jointscope.tools.acceptance.evaluation import AcceptedBy, exit_code
 from jointscope.tools.acceptance.limits import Limit, read_limits
+from jointscope.tools.acceptance.units import check_units
 
 
 def add_accept_option(parser: argparse.ArgumentParser) -> None:
@@ -16,18 +19,20 @@ def add_accept_option(parser: argparse.ArgumentParser) -> None:
         "--accept",
         type=Path,
         metavar="LIMITS.yaml",
-        help="limits that the result must keep (docs/accept.md); exit code 3 if one fails, 4 if one is not evaluated",
+        help="limits that the result must meet (docs/accept.md); exit code 3 if one fails, 4 if one is not evaluated",
     )
 
 
-def limits_of(args: argparse.Namespace) -> tuple[Limit, ...]:
-    """The limits that the user named; none without --accept.
+def limits_of(args: argparse.Namespace, robots: Iterable[Robot]) -> tuple[Limit, ...]:
+    """The limits that the user named, whose units fit the robots; none without --accept.
 
     Raises:
-        RobotError: the file has a mistake.
+        RobotError: the file has a mistake, or a bound is in another unit than what it limits.
     """
     path = getattr(args, "accept", None)  # verbs that build on `compare` do not have it
-    return () if path is None else read_limits(path)
+    limits = () if path is None else read_limits(path)
+    check_units(limits, robots)
+    return limits
 
 
 def print_acceptance(checked: AcceptedBy) -> int:

@@ -20,12 +20,12 @@ KINDS = {
     "poses": ("TABLE-or-BAG", "poses of the arm at rest with a measured target (docs/poses.md)", "poses"),
     "rests": (
         "BAG",
-        "recordings in which the robot stands again and again, with weights on it or without (docs/rests.md)",
+        "recordings in which the robot repeatedly stands still, with or without weights (docs/rests.md)",
         "recordings of rests",
     ),
     "frequency": (
         "BAG",
-        "recordings of the arm shaken in one pose each (docs/frequency.md)",
+        "recordings of the arm being shaken, in one pose each (docs/frequency.md)",
         "recordings of the arm shaken",
     ),
 }

@@ -72,7 +72,7 @@ class DemoStory:
             write_bag(self.hidden / f"{name}.mcap", simulation.recording, self.robot)
         write_json(self.hidden / f"{name}.truth.json", simulation.truth)
         count = simulation.recording.sample_count
-        say(f"{self.folder}/{name}.mcap: {count:,} messages; what is true stands in {name}.truth.json")
+        say(f"{self.folder}/{name}.mcap: {count:,} messages; the true values are in {name}.truth.json")
         return dict(simulation.truth["parameters"])
 
     def _discover(self) -> Discovery:

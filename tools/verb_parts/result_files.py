@@ -82,7 +82,7 @@ def can_draw_pdf() -> bool:
 def add_result_options(parser: argparse.ArgumentParser, viewer: bool = True) -> None:
     """Adds --report, --figures and --json, which every verb that estimates something takes, and --rrd for motion."""
     parser.add_argument("--report", type=Path, metavar="F.html", help="write a report for the browser")
-    pictures = "write every picture of the report as SVG, and as PDF, too, if the extra `plot` is installed"
+    pictures = "write every picture of the report as SVG, and also as PDF if the extra `plot` is installed"
     parser.add_argument("--figures", type=Path, metavar="DIR", help=pictures)
     if viewer:
         parser.add_argument("--rrd", type=Path, metavar="F.rrd", help="write a recording for `jointscope view`")

@@ -19,7 +19,7 @@ def add_simulation_options(parser: argparse.ArgumentParser) -> None:
         action="append",
         default=[],
         metavar="ID@OWNER[:param=value,...]",
-        help="a physical effect, in a size that matters unless values are given; may be repeated; the list is below",
+        help="a physical effect, of a noticeable size unless you give values; may be repeated; listed below",
     )
     parser.add_argument(
         "--set", action="append", default=[], metavar="NAME=VALUE", help="true value of a parameter; may be repeated"

@@ -23,7 +23,7 @@ def add_workers_option(parser: argparse.ArgumentParser) -> None:
 
 def add_spreading_option(parser: argparse.ArgumentParser) -> None:
     """Adds both options, to verbs that fit one model."""
-    _add(parser, 1, "processes on which several bags are spread; default 1")
+    _add(parser, 1, "processes over which several bags are spread; default 1")
 
 
 @contextmanager
@@ -81,7 +81,7 @@ def _add(parser: argparse.ArgumentParser, default: int, what: str) -> None:
     parser.add_argument(
         "--scheduler",
         metavar="ADDRESS",
-        help="a Dask cluster that does this instead, tcp://HOST:8786 (extra `cluster`)",
+        help="a Dask cluster to use instead, tcp://HOST:8786 (extra `cluster`)",
     )
 
 

@@ -58,13 +58,13 @@ def add_parser(subparsers: Any) -> None:
         "--solver",
         choices=("condensed", "samples"),
         default="condensed",
-        help="condensed (default): a factor for every thousand samples; samples: one for each, by GTSAM's own "
+        help="condensed (default): a factor for every thousand samples; samples: one for each, with GTSAM's own "
         "optimizer, the slow reference for a second or two of recording",
     )
     parser.add_argument(
         "--incremental",
         action="store_true",
-        help="solve stretch after stretch with iSAM2 and print what is known after each; the end is that of the batch",
+        help="solve stretch after stretch with iSAM2 and print what is known after each; the end result is the same",
     )
     add_spreading_option(parser)
     add_kind_options(parser)
@@ -101,7 +101,8 @@ def run(args: argparse.Namespace) -> int:
     from jointscope.tools.verdicts.judgement import judge
 
     load_user_effects(args.effects)
-    robot, limits = load_robot(args.robot), limits_of(args)
+    robot = load_robot(args.robot)
+    limits = limits_of(args, [robot])
     still = _still_kinds(args, robot, files, limits)
     if still is not None:
         with progress_bar() as progress:
@@ -178,7 +179,7 @@ def _check_kinds(args: argparse.Namespace) -> None:
             "batch takes all kinds in one graph"
         )
     if args.urdf is not None and not args.poses:
-        raise RecordingError("--urdf writes the geometry that poses tell; give --poses, too")
+        raise RecordingError("--urdf writes the geometry found from poses; give --poses, too")
 
 
 def _solver(args: argparse.Namespace, robot: Any) -> Any:

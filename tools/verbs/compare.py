@@ -84,8 +84,8 @@ def run(args: argparse.Namespace) -> int:
     from jointscope.tools.terminal.comparison_text import comparison_text
 
     load_user_effects(args.effects)
-    limits = limits_of(args)
     robots = {label: load_robot(robot) for label, robot in zip(names, args.robots, strict=True)}
+    limits = limits_of(args, robots.values())
     if poses:
         return _on_poses(robots, poses, files, limits)
     if rests:

@@ -21,8 +21,8 @@ def add_parser(subparsers: Any) -> None:
     parser = subparsers.add_parser(
         "demo",
         help="the whole story on a simulated Doggy with a soft bearing, from bag to report",
-        description="Simulates recordings of a robot with a soft bearing, lets `discover` find what the model lacks, "
-        "checks the result against the truth, and writes everything into a folder. Takes several minutes.",
+        description="Simulates recordings of a robot with a soft bearing, lets `discover` find what the model lacks,\n"
+        "checks the result against the truth, and writes everything into a folder. Takes two minutes.",
         epilog=EXAMPLE,
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )

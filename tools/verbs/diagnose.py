@@ -22,15 +22,15 @@ EXAMPLE = """example:
   jointscope diagnose biorob --rests spring1 spring2 gravity --report diagnosis.html
   jointscope diagnose tx90l --frequency frequency_P1 frequency_P3 --poses poses.csv
 
-The robot is calibrated first. Effects are chosen by blocks of the training recordings that were left out; the held-out
-recording only reports. `jointscope add` puts an effect into the robot file, `jointscope discover` repeats both."""
+The robot is calibrated first. Effects are chosen on blocks of the training recordings that were left out; the held-out
+recording is only scored. `jointscope add` puts an effect into the robot file, `jointscope discover` repeats both."""
 ARM_LIMITS = (
-    "--accept: a diagnosis of poses or frequency responses has nothing that limits are of; `jointscope calibrate` and "
+    "--accept: limits do not apply to a diagnosis of poses or frequency responses; `jointscope calibrate` and "
     "`jointscope compare` take them with --poses and --frequency"
 )
 
 REST_LIMITS = (
-    "--accept: a diagnosis of rests has nothing that limits are of; `jointscope calibrate` and `jointscope compare` "
+    "--accept: limits do not apply to a diagnosis of rests; `jointscope calibrate` and `jointscope compare` "
     "take them with --rests"
 )
 
@@ -58,12 +58,12 @@ def run(args: argparse.Namespace) -> int:
     check_kind(args)
     check_outputs(files.all, inputs=input_files(args))
     load_user_effects(args.effects)
-    limits = limits_of(args)
     from jointscope.robots.files.robot_file import load_robot
     from jointscope.tools.notebook.calls import diagnose
     from jointscope.tools.terminal.diagnosis_text import diagnosis_text
 
     robot = load_robot(args.robot)
+    limits = limits_of(args, [robot])
     if args.poses or args.frequency:
         if limits:
             raise RobotError(ARM_LIMITS)

@@ -40,8 +40,8 @@ def add_parser(subparsers: Any) -> None:
     parser = subparsers.add_parser(
         "discover",
         help="calibrates, diagnoses, adds what is missing, and repeats until nothing helps",
-        description="Finds the physical effects that a model lacks and adds them one by one. An effect is chosen by "
-        "blocks of the training recordings that its first fit leaves out; it stays if the error on the training "
+        description="Finds the physical effects that a model lacks and adds them one by one. An effect is chosen on\n"
+        "blocks of the training recordings that its first fit leaves out; it stays if the error on the training\n"
         "recordings also falls when the model is calibrated with all of them. The held-out recording is only scored.",
         epilog=EXAMPLE,
         formatter_class=argparse.RawDescriptionHelpFormatter,

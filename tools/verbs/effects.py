@@ -29,8 +29,8 @@ def add_parser(subparsers: Any) -> None:
     parser = subparsers.add_parser(
         "effects",
         help="lists the physical effects that a model may lack, or prints the card of one",
-        description="Lists the catalogue of physical effects. With an id: the card of that effect: its equation, "
-        "parameters, the motion that shows it, and what it is confused with.",
+        description="Lists the catalogue of physical effects. With an id, prints the card of that effect: equation\n"
+        "and parameters, the motion that shows it, and what it is easily confused with.",
         epilog=EXAMPLE,
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )

@@ -25,7 +25,7 @@ def add_parser(subparsers: Any) -> None:
     parser = subparsers.add_parser(
         "frequency",
         help="frequency response matrix of any system, with noise and total covariance",
-        description="Frequency responses from recordings of periodic excitation, each bag by itself.",
+        description="Estimates frequency responses from recordings of periodic excitation, one for each bag.",
         epilog=EXAMPLE,
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )

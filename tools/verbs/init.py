@@ -24,9 +24,9 @@ EXAMPLE = """example:
   jointscope calibrate arm.yaml moves.mcap -o arm_calibrated.yaml
   jointscope discover arm.yaml moves.mcap --holdout-share 0.33 -o better.yaml
 
-The recording should move every joint, several at once. Guessed are joints, topics, units, signs, on which link a
-gyroscope sits and how it is turned, noise of the sensors, and by regression gravity, the unit of the command and the
-drives, which are printed as a table with sigmas; every guess stands in the file with its reason."""
+The recording should move every joint, several at once. `init` guesses joints, topics, units, signs, the link and the
+mounting of each gyroscope, the noise of the sensors, and, by regression, gravity, the unit of the command and the
+drives, which it prints as a table with sigmas. Every guess is in the file, with its reason."""
 
 
 def add_parser(subparsers: Any) -> None:
@@ -41,12 +41,12 @@ def add_parser(subparsers: Any) -> None:
     parser.add_argument("urdf", metavar="URDF", type=Path, help="bodies and joints of the robot")
     parser.add_argument("bag", metavar="BAG", type=Path, help="a .bag, .mcap, .db3 or a ROS 2 bag folder")
     parser.add_argument("-o", "--output", metavar="ROBOT", type=Path, required=True, help="robot file to write")
-    parser.add_argument("--name", default="", help="name of the robot; that of the URDF's file by default")
+    parser.add_argument("--name", default="", help="name of the robot; by default that of the URDF file")
     parser.add_argument(
         "--joints",
         default="",
         metavar="A,B,...",
-        help="joints to use, if not all that move and are driven; A=NAME says what the messages call joint A",
+        help="joints to use, if not all that move and are driven; A=NAME gives the name of joint A in the messages",
     )
     parser.add_argument(
         "--lock", default="", metavar="A,B,...", help="joints to hold at their mean although they move in the bag"
@@ -56,14 +56,14 @@ def add_parser(subparsers: Any) -> None:
         default="",
         type=lambda text: text.replace(" ", ""),  # robot files say "N m"
         choices=("duty", "V", "A", "Nm"),
-        help="unit of the command, if you know it; else the masses of the URDF and its size tell",
+        help="unit of the command, if you know it; by default guessed from its size and the masses of the URDF",
     )
     parser.add_argument(
         "--target",
         action="append",
         default=[],
         metavar="TOPIC=LINK",
-        help="positions that a camera or motion capture measured of a point on this link; may be repeated",
+        help="topic with positions of a point on this link, from a camera or motion capture; may be repeated",
     )
     parser.add_argument("--json", type=Path, metavar="FILE", help="write the guesses as JSON")
     parser.set_defaults(run=run)
@@ -105,7 +105,7 @@ def run(args: argparse.Namespace) -> int:
         content["drives"] = drive_content(guess)
         content["locked"] = {h.joint: h.position for h in guess.held}
         write_json(args.json, content | {"usable": description.usable, "problem": description.problem})
-    print(f"{guess.name}: {', '.join(guess.roles.joints)}; concluded from the recording:")
+    print(f"{guess.name}: {', '.join(guess.roles.joints)}; inferred from the recording:")
     held = {h.joint for h in guess.held}
     for line in guesses_in_sections(text):
         key = line.partition(":")[0].strip("'")

@@ -26,8 +26,8 @@ BATCH_SECONDS = 120.0  # longer recordings are compared with the batch smoother 
 EXAMPLE = """example:
   jointscope replay doggy_calibrated.yaml run.mcap --lag 0.1 --rrd run.rrd --report run.html
 
-Messages come in the order and at the times at which they were received: late, repeated and broken ones, too. The states
-go to a table with -o, one row per command. With --live the viewer shows them while they are estimated."""
+Messages come in the order and at the times at which they were received, including late, repeated and broken ones. With
+-o the states go to a table, one row per command. With --live the viewer shows them while they are estimated."""
 
 
 def add_parser(subparsers: Any) -> None:

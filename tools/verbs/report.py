@@ -12,7 +12,7 @@ from jointscope.tools.verbs import compare
 EXAMPLE = """example:
   jointscope report doggy doggy_calibrated.yaml moves.mcap -o comparison.html
 
-A calibration, a diagnosis and a discovery write theirs themselves: `jointscope diagnose ... --report F.html`."""
+`calibrate`, `diagnose` and `discover` write reports of their own: `jointscope diagnose ... --report F.html`."""
 
 
 def add_parser(subparsers: Any) -> None:

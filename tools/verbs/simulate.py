@@ -27,7 +27,7 @@ EXAMPLE = """example:
   jointscope simulate tx90l --kind poses -o poses.csv --seed 3 --effect encoder_eccentricity@joint4
   jointscope simulate tx90l --kind frequency -o shaken --seed 3 --pose 0.1,0.72,0.62,1.2,1.0,0.3 --pose 0,0.5,1.8,0,1,0
 
-The same seed is the same robot; the truth is written beside the bag as train.truth.json."""
+The same seed gives the same robot; the truth is written beside the bag as train.truth.json."""
 
 
 def add_parser(subparsers: Any) -> None:
@@ -51,14 +51,17 @@ def add_parser(subparsers: Any) -> None:
         "arm that is shaken; default: what the robot has",
     )
     parser.add_argument("--count", type=int, metavar="N", help="number of poses; default 40, or 2 if shaken")
-    parser.add_argument("--orientation", action="store_true", help="of poses: the tracker tells it of every target")
-    parser.add_argument("--session", default="poses", metavar="NAME", help="another name gives other poses of the arm")
+    turned = "of poses: the tracker also measures the orientation of every target"
+    parser.add_argument("--orientation", action="store_true", help=turned)
+    parser.add_argument(
+        "--session", default="poses", metavar="NAME", help="a different name gives different poses of the arm"
+    )
     add_shaking_options(parser)
     parser.add_argument(
         "--motion",
         choices=list(DEFAULT_SECONDS),
         default="calibration",
-        help="calibration: rest, slow and fast motion, chirps; moves: others, to judge by; default calibration",
+        help="calibration: rest, slow and fast motion, chirps; moves: others, to test a model; default calibration",
     )
     parser.add_argument("--seconds", type=float, metavar="S", help=f"duration [s]; default {defaults}")
     parser.add_argument("--seed", type=int, default=0, metavar="N", help="of robot, motion and noise; default 0")

@@ -98,7 +98,7 @@ def _noise(result: FrequencyCalibration) -> Check:
     known = [pose for pose in result.explained.poses if pose.over_noise is not None]
     left = percent(max(float(pose.left.max()) for pose in result.explained.poses))
     if not known:
-        return Check("info", name, f"The balance leaves up to {left} of a motor's torque; one period tells no noise.")
+        return Check("info", name, f"The balance leaves up to {left} of a motor's torque; one period shows no noise.")
     ratios = [_ratio(pose) for pose in known]
     text = f"The balance leaves up to {left} of a motor's torque, {_range(ratios)} times the power of the noise"
     if max(ratios) > AS_NOISE:
@@ -119,7 +119,7 @@ def _range(ratios: Sequence[float]) -> str:
 def _heldout(result: FrequencyCalibration) -> Check:
     name, found = "A realisation that others predict", result.explained
     if not found.heldout:
-        return Check("info", name, "One realisation of the phases cannot tell; record another one.")
+        return Check("info", name, "One realisation of the phases cannot decide; record another one.")
     ratios = {number: error / found.fitted[number] for number, error in found.heldout.items()}
     worst = max(ratios, key=lambda number: ratios[number])
     level = "good" if ratios[worst] <= WORSE[0] else "warn" if ratios[worst] <= WORSE[1] else "bad"
@@ -133,7 +133,7 @@ def _heldout(result: FrequencyCalibration) -> Check:
 
 
 def _agree(result: FrequencyCalibration) -> Check:
-    name, found = "Recordings that tell the same values", result.explained
+    name, found = "Recordings that agree on the values", result.explained
     tests = {**found.between_poses, **{f"realisation {n}": a for n, a in found.between_realisations.items()}}
     if not tests:
         return Check("info", name, "One pose and one realisation: nothing to compare; shake the arm in another pose.")
@@ -152,7 +152,7 @@ def _agree(result: FrequencyCalibration) -> Check:
 def _told(result: FrequencyCalibration) -> Check:
     springs = [name for name in result.silent if name.split(".", 1)[1] == STIFFNESS]
     level = "warn" if springs else "info" if result.silent else "good"
-    return Check(level, "Values that are told", f"Springs and dampers: {identifiable_sentence(result)}.")
+    return Check(level, "Values that are determined", f"Springs and dampers: {identifiable_sentence(result)}.")
 
 
 def _friction(result: FrequencyCalibration) -> Check:

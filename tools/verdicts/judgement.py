@@ -118,8 +118,8 @@ def judge(result: CalibrationResult) -> Judgement:
 def _consequences(checks: Sequence[Check]) -> list[Check]:
     """Checks of values that no model could have found: their advice would mend nothing."""
     told = (
-        "That cannot be told as long as drives saturate, a tracker is late or moves, a load changes, something pushes, "
-        "or samples are too rare."
+        "That cannot be judged as long as drives saturate, a tracker is late or moves, a load changes, something "
+        "pushes, or samples are too rare."
     )
     return [Check("info", check.name, told) if check.level in ("warn", "bad") else check for check in checks]
 
@@ -217,7 +217,7 @@ def _determined(result: CalibrationResult) -> Check:
         return Check(
             "bad",
             name,
-            f"Typical values are {known}: the recording tells their ratios at best. Hold one that you know with "
+            f"Typical values are {known}: the recording determines their ratios at best. Hold one that you know with "
             "`fixed: true` in the robot file, or record more.",
         )
     weak = [d for d in result.weak_directions if not all(_is_sensor_name(p) for p in d.weights)]

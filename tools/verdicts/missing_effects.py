@@ -53,9 +53,9 @@ def missing_effects(result: CalibrationResult) -> tuple[str, str]:
     if result.robot.free_links:
         return "info", "Without masses this cannot be checked."
     if given(result):
-        return "info", "That cannot be told as long as drives saturate, a load changes, or samples are too rare."
+        return "info", "That cannot be judged as long as drives saturate, a load changes, or samples are too rare."
     if result.asked.link:
-        return "info", "That cannot be told as long as a link weighs something else than the URDF says."
+        return "info", "That cannot be judged as long as the mass of a link differs from the URDF's."
     if result.asked.causes:
         return _named(result)
     if result.asked.gains:
@@ -71,14 +71,14 @@ def missing_effects(result: CalibrationResult) -> tuple[str, str]:
     if first.effect in LATE and same_time(result)[0] in ("warn", "bad"):
         return (
             "info",
-            "What looks like a late drive signal here is said above; the rest can be told once that is mended.",
+            "What looks like a late drive signal here is said above; the rest can be judged once that is fixed.",
         )
     worst = max(shares, key=lambda name: abs(first.with_it[name] - found[name].value) / found[name].sigma)
     others = [e.label for e in result.lacking if e is not first and e.p_value <= AS_SURE * first.p_value]
     alike = f" (or {' or '.join(others[:MOST_ALIKE])}, which may look alike)" if others else ""
     covered = "" if asked else ", which its sigma covers"
     return "bad" if asked else "warn", (
-        f"The recording asks for {first.label}, {catalogue()[first.effect].card.title}{alike}: with it "
+        f"The recording calls for {first.label}, {catalogue()[first.effect].card.title}{alike}: with it "
         f"{_change(result, first, worst)}{covered}. {_next(result, first)}."
     )
 

@@ -73,7 +73,7 @@ def _elsewhere(result: PoseCalibration) -> Check:
         scaled = all(p.poses.target is not None or p.distances(c)[0].size for p, c in _solved(result))
         wanted = "record poses all over the workspace"
         if not scaled:
-            wanted = "nothing tells how large the arm is: give contacts places, and the robot file `contact_distance`"
+            wanted = "nothing sets the scale of the arm: give contacts places, and the robot file `contact_distance`"
         text += f", {significant(ratio, 2)} times what is left at these poses: priors decide the rest; " + wanted
     return Check(level, "Poses all over the workspace", f"{text}.")
 

@@ -27,9 +27,9 @@ def same_time(result: CalibrationResult) -> tuple[str, str]:
     if not (names := timing.moved(result.found)):
         return "good", f"Give or take {significant(1e3 * max(delay, sigma), 2)} ms, which changes no value by much."
     if result.exchanged:
-        return "info", "That cannot be told as long as joints have each other's commands or positions."
+        return "info", "That cannot be judged as long as joints have each other's commands or positions."
     if result.asked.names and not result.asked.late:  # what is missing there looks late to one linear step
-        return "info", "What the regression names explains what looks late; it can be told once that is mended."
+        return "info", "What the regression names explains what looks late; it can be judged once that is fixed."
     worst = max((p for p in result.parameters if p.name in names), key=lambda p: abs(timing.changes[p.name]) / p.sigma)
     other = worst.value + timing.changes[worst.name]
     lag = result.asked.lag

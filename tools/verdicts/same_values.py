@@ -10,7 +10,7 @@ from jointscope.graphs.frequency.agreement import Agreement
 from jointscope.graphs.joint_kinds.beside_motion import responses_agree
 from jointscope.tools.presentation.numbers import significant
 
-NAME = "Kinds that tell the same values"
+NAME = "Kinds that agree on the values"
 BY_REGRESSION = "Regression says the same"
 APART = (5.0, 0.03)  # [sigma of both ways together, share of the value], both, from which two ways disagree
 

@@ -3,9 +3,12 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
+import jointscope as js
 from jointscope.graphs.comparison import causal_filter
 from jointscope.graphs.comparison.causal_filter import FilteredStates, filter_around, filter_states
 from jointscope.graphs.comparison.compare import smooth
@@ -26,7 +29,8 @@ def solved(doggy):
 def test_rounds_of_linear_steps_end_where_the_filter_tick_by_tick_does(solved, monkeypatch):
     problem, x, calibration = solved
     monkeypatch.setattr(causal_filter, "CHUNK", 500)  # several stretches
-    monkeypatch.setattr(causal_filter, "BURN_IN", 10.0)  # all runs tick by tick begin where the recording does
+    monkeypatch.setattr(causal_filter, "BURN_IN", 10.0)
+    monkeypatch.setattr(causal_filter, "_starts", lambda _, first, __: 0 * first)  # where the recording begins
     slow = causal_filter._tick_by_tick(problem, filter_around(problem, x, calibration), calibration)
     fast = filter_states(problem, calibration, x)
     sigma = np.sqrt(np.einsum("kii->ki", slow.covariance))
@@ -41,3 +45,26 @@ def test_where_rounds_do_not_settle_the_filter_runs_tick_by_tick(solved, monkeyp
     monkeypatch.setattr(causal_filter, "_tick_by_tick", lambda *args: asked.append(args) or found)
     assert filter_states(problem, calibration, x) is found
     assert len(asked) == 1
+
+
+@pytest.mark.slow
+def test_a_link_that_rests_in_the_middle_of_its_backlash_is_followed_once_it_moves(doggy):
+    """Linear steps from a rest in which the link may be anywhere in the gap learn one of its ends, and keep to it."""
+    pytest.importorskip("mujoco")
+    hidden = ["backlash@joint3:half_gap=0.01"]
+    simulated = js.simulate(doggy, motion="moves", seconds=4.0, seed=2, friction="smooth", effects=hidden)
+    true = simulated.truth["parameters"]
+    robot = js.add(doggy, "backlash@joint3")
+    known = {name: replace(p, value=true[name], sigma=1e-6) for name, p in robot.parameters.items()}
+    mounted = {
+        gyro.name: replace(
+            gyro, R_imu_body=np.array(true[f"{gyro.name}.R_imu_body"]), bias=np.array(true[f"{gyro.name}.bias"])
+        )
+        for gyro in robot.gyros
+    }
+    noise = replace(
+        robot.noise, link_velocity=np.full(3, 1e-3), motor_velocity=np.full(3, 1e-3)
+    )  # as calibrations find
+    robot = replace(robot, parameters=known, sensors={**robot.sensors, **mounted}, noise=noise)
+    compared = js.compare(robot, simulated).models[0]
+    assert compared.error < 1.1 * compared.floor < 1.2

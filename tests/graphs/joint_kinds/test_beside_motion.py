@@ -91,7 +91,7 @@ def test_a_drive_that_is_softer_in_the_motion_is_a_contradiction(tmp_path):
     bags = [tmp_path / "both" / f"frequency_{k}.mcap" for k in (1, 2)]
     both = js.calibrate(three_axes(tmp_path), tmp_path / "moves.mcap", frequency=bags)
     assert responses_agree(both).doubtful
-    (check,) = [c for c in judge(both).checks if c.name == "Kinds that tell the same values"]
+    (check,) = [c for c in judge(both).checks if c.name == "Kinds that agree on the values"]
     assert check.level == "bad" and "contradict each other" in check.text
 
 

@@ -128,7 +128,7 @@ def test_effects_that_rests_cannot_show_say_why(lever):
     found = diagnose_rests(lever, [Lever().hanging(30, 1)])
     why = {c.label: c.why for c in found.candidates if c.verdict == "untestable"}
     assert why["encoder_delay@swing"] == "does nothing while nothing moves"
-    assert why["hysteresis@swing"] == "depends on how a joint came to rest, which rests do not tell"
+    assert why["hysteresis@swing"] == "depends on how a joint came to rest, which rests do not show"
     assert why["motor_viscous@swing"] == "does nothing at these rests"
     assert why["link_coulomb@swing"] == "would hold a link away from equilibrium, at which rests take all links"
 

@@ -46,7 +46,7 @@ def test_joints_that_stood_all_the_time_are_told_with_what_to_do(tmp_path):
     result = calibrate_rests(robot, [replace(rests, moved=np.zeros((40, 1), dtype=bool))])
     said = verdict(result)
     assert said.startswith(
-        "No, do not rely on this yet: these rests tell no value; swing never moved before any of these"
+        "No, do not rely on this yet: these rests determine no value; swing never moved before any of these"
     )
     assert "say nothing about friction there" in said and "from above and from below" in said and not result.doubts
     springs = lever(tmp_path)

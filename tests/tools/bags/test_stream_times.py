@@ -63,7 +63,7 @@ def test_a_clock_that_is_set_back_is_refused(back):
         in_time_order("imu1", samples(stamps))
     assert str(error.value) == (
         f"imu1: the stamps go back by {'0.699 s' if back == 700 else '99 ms'} at message 1000 and do not recover, and "
-        "the times of reception do not tell why; expected one clock without jumps: use the part before or after it, "
+        "the times of reception do not explain why; expected one clock without jumps: use the part before or after it, "
         "cut out with `ros2 bag convert` (start_time_ns, end_time_ns) or `rosbag filter`, or record again"
     )
 

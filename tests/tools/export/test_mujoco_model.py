@@ -1,7 +1,9 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Robots as MuJoCo models against the equations that they were calibrated with."""
 
+import re
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pinocchio as pin
@@ -37,6 +39,27 @@ HELD = {
 
 
 DOGGY = load_robot("doggy")
+SLIDE_URDF = """<robot name="slide"><link name="base"/>
+<link name="table"><inertial><mass value="12"/>
+<inertia ixx="1" iyy="1" izz="1" ixy="0" ixz="0" iyz="0"/></inertial></link>
+<joint name="carriage" type="prismatic"><parent link="base"/><child link="table"/><origin rpy="0 0.5 0"/>
+<axis xyz="1 0 0"/><limit lower="-0.1" upper="0.4" effort="400" velocity="1"/></joint></robot>"""
+SLIDE = """format: 1
+name: slide
+urdf: slide.urdf
+gravity: [0.0, 0.0, -9.81]
+joints: [carriage]
+command: {topic: /motor_command, type: sensor_msgs/msg/JointState, field: effort, unit: N m}
+sensors:
+  motor_encoder: {kind: motor_encoder, topic: /joint_states, type: sensor_msgs/msg/JointState, field: position, unit: m,
+                  sigma: 2.0e-8}
+parameters:
+  carriage.coulomb_torque: {value: 15.0, unit: N, prior_sigma: 30.0}
+  carriage.inertia: {value: 40.0, unit: kg, prior_sigma: 80.0}
+  carriage.stiffness: {value: 4.0e4, unit: N/m, prior_sigma: 8.0e4}
+  carriage.damping: {value: 300.0, unit: N s/m, prior_sigma: 600.0}
+noise: {estimate: true, link_velocity: [0.35], motor_velocity: [0.26]}
+"""
 
 
 def with_effects(robot: Robot, values: dict[str, float]) -> Robot:
@@ -79,6 +102,49 @@ def test_accelerations_are_those_of_the_calibrated_model(name, seed, tmp_path):
     mujoco.mj_forward(model, data)
     expected = equations_of(robot)(x, u)
     np.testing.assert_allclose(data.qacc[place], expected, rtol=0, atol=SIX_DIGITS * np.abs(expected).max())
+
+
+def coupled(_) -> Robot:
+    """Ropes over several joints; the friction that grows with the load has no element in the engine."""
+    robot = load_robot("biorob")
+    return robot.with_values({name: 1e-12 for name in robot.parameters if "weight_dependent" in name})
+
+
+def sliding(folder) -> Robot:
+    (folder / "slide.urdf").write_text(SLIDE_URDF, encoding="utf-8")
+    (folder / "slide.yaml").write_text(SLIDE, encoding="utf-8")
+    return load_robot(folder / "slide.yaml")
+
+
+def mimicking(folder) -> Robot:
+    """A knee, a tail and a slide that follow joints of the robot."""
+    text = DOGGY.path.read_text(encoding="utf-8")
+    urdf = Path(__file__).parents[2] / "graphs" / "mimicking_doggy.urdf"
+    (folder / "mimicking.yaml").write_text(re.sub(r"(?m)^urdf:.*$", f"urdf: {urdf}", text), encoding="utf-8")
+    return load_robot(folder / "mimicking.yaml")
+
+
+@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize(
+    "make, exact",
+    [(coupled, SIX_DIGITS), (sliding, SIX_DIGITS), (mimicking, 2e-3)],  # the engine holds followers by stiff springs
+)
+def test_coupled_sliding_and_mimicking_joints_accelerate_as_in_the_calibrated_model(make, exact, seed, tmp_path):
+    robot = make(tmp_path)
+    robot = robot.with_values(
+        {f"{joint}.coulomb_torque": 1e-12 for joint in robot.joints if f"{joint}.coulomb_torque" in robot.parameters}
+    )
+    model, data, place = engine_of(robot)
+    model.jnt_limited[:] = 0  # a slide has few centimetres; the equations know no end stops
+    rng, layout = np.random.default_rng(seed), robot.layout
+    x, u = rng.uniform(-0.3, 0.3, layout.size), rng.uniform(-0.5, 0.5, robot.n)
+    data.qpos[place], data.qvel[place], data.ctrl[:] = x[layout.positions], x[layout.velocities], u
+    for follower, leads, (offset, slope, *_) in zip(model.eq_obj1id, model.eq_obj2id, model.eq_data, strict=True):
+        data.qpos[follower], data.qvel[follower] = offset + slope * data.qpos[leads], slope * data.qvel[leads]
+    assert bool(model.neq) == (make is mimicking)
+    mujoco.mj_forward(model, data)
+    expected = equations_of(robot)(x, u)
+    np.testing.assert_allclose(data.qacc[place], expected, rtol=0, atol=exact * np.abs(expected).max())
 
 
 def test_pinocchio_reads_masses_damping_and_armatures_of_rigid_joints(tmp_path):

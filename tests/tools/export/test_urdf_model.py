@@ -124,7 +124,7 @@ def test_geometry_of_poses_is_in_it_and_sag_is_named(tmp_path):
 
 
 def test_a_robot_whose_masses_are_not_known_is_refused():
-    told = r"^kr300 has link_dynamics: free, so its masses are not known, .* stands in kr300\.yaml$"
+    told = r"^kr300 has link_dynamics: free, so its masses are not known, .* is in kr300\.yaml$"
     with pytest.raises(RobotError, match=told):
         urdf_model(load_robot("kr300"))
 

@@ -7,6 +7,7 @@ import dataclasses
 import html
 import importlib
 import json
+import re
 import sys
 from types import SimpleNamespace
 
@@ -51,7 +52,7 @@ def test_a_result_is_still_the_result_of_the_computation(calibrated):
 
 def test_a_parameter_is_found_by_its_name_and_an_unknown_one_is_told_with_those_there_are(calibrated):
     assert calibrated["joint2.stiffness"].unit == "N m/rad"
-    with pytest.raises(RobotError, match=r"^doggy has no parameter joint9\.stiffness; it has motor\.k_pwm, "):
+    with pytest.raises(RobotError, match=r"^there is no parameter 'joint9\.stiffness'; did you mean 'joint\d\."):
         calibrated["joint9.stiffness"]
 
 
@@ -163,6 +164,27 @@ def test_saving_writes_what_the_verb_writes(calibrated, tmp_path):
     assert {file.name for file in tmp_path.iterdir()} == {"a.yaml", "a.html", "a.json"}
 
 
+def test_parameters_are_asked_by_name_and_print_a_line_each(calibrated):
+    stiffness = calibrated.parameters["joint2.stiffness"]
+    assert stiffness is calibrated["joint2.stiffness"]
+    assert re.fullmatch(r"joint2\.stiffness = [\d.]+ ± [\d.]+ N m/rad, prior 400 ± 600(, .+)?", repr(stiffness))
+    assert f"{stiffness}" == repr(stiffness)
+    assert "<b>joint2.stiffness</b> = " in stiffness._repr_html_() and "\n" not in stiffness._repr_html_()
+    lines = repr(calibrated.parameters).splitlines()
+    assert len(lines) == len(calibrated.parameters) and repr(stiffness) in lines
+    assert calibrated.parameters[:1] == (calibrated.parameters[0],)
+    assert stiffness._repr_html_() in calibrated.parameters._repr_html_()
+    with pytest.raises(RobotError, match=r"'joint2\.stifness'; did you mean 'joint2\.stiffness'\?$"):
+        calibrated.parameters["joint2.stifness"]
+
+
+def test_a_parameter_of_a_robot_prints_as_a_line():
+    robot = js.load_robot("doggy")
+    assert repr(robot.parameters["joint1.stiffness"]) == "joint1.stiffness = 400 N m/rad, prior 400 ± 600"
+    held = dataclasses.replace(robot.parameters["joint1.stiffness"], sigma=0.25, fixed=True)
+    assert str(held) == "joint1.stiffness = 400 ± 0.25 N m/rad, prior 400 ± 600, fixed"
+
+
 def test_a_simulation_says_what_it_is_and_saves_its_truth_alone(simulated, tmp_path):
     assert simulated.answer().startswith("2 s of doggy, motion calibration, seed 1, ")
     assert simulated.answer().endswith("effects: cogging@joint1")
@@ -176,7 +198,7 @@ def test_a_simulation_says_what_it_is_and_saves_its_truth_alone(simulated, tmp_p
 def limited(found, folder, *lines: str):
     """A made-up result held against limits, as `calibrate` and `compare` do it."""
     (folder / "limits.yaml").write_text("limits:\n" + "".join(f"  - {{{line}, because: a bench}}\n" for line in lines))
-    limits = limits_of(folder / "limits.yaml")
+    limits = limits_of(folder / "limits.yaml", [found.robot])
     return Calibrated.of(found, acceptance=check_models(limits, {"doggy": found.to_json()}))
 
 
@@ -188,13 +210,17 @@ def test_without_limits_a_result_is_not_evaluated_and_never_accepted_by_silence(
 @pytest.mark.parametrize(
     ("lines", "outcome", "said"),
     [
-        (["parameter: joint2.stiffness, at_least: 1"], "pass", "Accepted: all 1 limits are kept."),
+        (["parameter: joint2.stiffness, at_least: 1 N m/rad"], "pass", "Accepted: the limit is met."),
         (
-            ["parameter: joint2.stiffness, at_least: 1", "parameter: joint2.stiffness, at_most: 1"],
+            ["parameter: joint2.stiffness, at_least: 1 N m/rad", "parameter: joint2.stiffness, at_most: 1 N m/rad"],
             "fail",
             "Not accepted: 1 of 2 limits",
         ),
-        (["parameter: joint2.stiffness, at_least: 1", "poses: all, p90_mm: 1"], "not evaluated", "Undecided: 1 of 2"),
+        (
+            ["parameter: joint2.stiffness, at_least: 1 N m/rad", "poses: all, p90_mm: 1"],
+            "not evaluated",
+            "Undecided: 1 of 2",
+        ),
     ],
 )
 def test_limits_are_shown_and_saved_with_the_result(lines, outcome, said, tmp_path):

@@ -31,7 +31,7 @@ def test_a_comparison_is_checked_model_by_model(bag, tmp_path, capsys):
     told, page = tmp_path / "out.json", tmp_path / "out.html"
     accept = limits(
         tmp_path,
-        "channel: joint1.motor_position, horizon: 0.1, error: 1.0e-9",
+        "channel: joint1.motor_position, horizon: 0.1, error: 1 nrad",
         "joint: joint1, missing_torque_percent: 5",
     )
     done = main(
@@ -43,12 +43,12 @@ def test_a_comparison_is_checked_model_by_model(bag, tmp_path, capsys):
         "doggy": ["fail", "not evaluated"],
         "doggy_paper": ["fail", "not evaluated"],
     }
-    assert "Not accepted: 1 of 2 limits are not kept." in capsys.readouterr().out
-    assert "Not accepted: 1 of 2 limits are not kept." in page.read_text()
+    assert "Not accepted: 1 of 2 limits failed." in capsys.readouterr().out
+    assert "Not accepted: 1 of 2 limits failed." in page.read_text()
 
 
 def test_what_cannot_be_told_has_an_exit_code_of_its_own(bag, tmp_path, capsys):
-    accept = limits(tmp_path, "parameter: joint1.stiffness, at_most: 1000")
+    accept = limits(tmp_path, "parameter: joint1.stiffness, at_most: 1000 N m/rad")
     assert main(["compare", "doggy", str(bag), "--accept", accept]) == 4
     assert "Undecided" in capsys.readouterr().out
 
@@ -63,7 +63,7 @@ def test_a_diagnosis_is_checked_for_torques_that_the_model_lacks(tmp_path, capsy
         tmp_path,
         "joint: carriage, missing_torque_percent: 50",
         'joint: "*", missing_torque_percent: 1.0e-9',
-        "channel: carriage.motor_position, horizon: 0.1, error: 1.0",
+        "channel: carriage.motor_position, horizon: 0.1, error: 1 m",
     )
     done = main(
         ["diagnose", str(robot), str(SLIDE / "train"), "--accept", accept, "--json", str(told), "--report", str(page)]
@@ -74,8 +74,8 @@ def test_a_diagnosis_is_checked_for_torques_that_the_model_lacks(tmp_path, capsy
     assert [line["outcome"] for line in lines] == ["pass", "fail", "pass"]
     found = f"{content['missing_torque_percent']['carriage']:.6g} %"
     assert [line["found"] for line in lines[:2]] == [found, found]
-    assert "Not accepted: 1 of 3 limits are not kept." in capsys.readouterr().out
-    assert "Not accepted: 1 of 3 limits are not kept." in page.read_text()
+    assert "Not accepted: 1 of 3 limits failed." in capsys.readouterr().out
+    assert "Not accepted: 1 of 3 limits failed." in page.read_text()
 
 
 @pytest.mark.slow
@@ -95,7 +95,9 @@ def test_limits_of_a_diagnosis_without_motion_are_refused(tmp_path, capsys):
 def test_a_calibration_from_poses_is_checked(tmp_path):
     told, out = tmp_path / "out.json", tmp_path / "arm.yaml"
     table = POSES / "poses_calibration"
-    accept = limits(tmp_path, "parameter: joint2.backlash, sigma: 1", 'parameter: "joint*.offset", between: [-1, 1]')
+    accept = limits(
+        tmp_path, "parameter: joint2.backlash, sigma: 1 rad", 'parameter: "joint*.offset", between: [-1, 1 rad]'
+    )
     done = main(["calibrate", "tx90l", "--poses", str(table), "-o", str(out), "--accept", accept, "--json", str(told)])
     assert done == 0
     assert {line["outcome"] for line in json.loads(told.read_text())["acceptance"]["tx90l"]} == {"pass"}

@@ -73,7 +73,7 @@ def test_friction_beyond_its_law_is_no_fault_and_one_period_tells_no_noise():
     name = "What is left against the noise"
     assert judged(pose(over_noise=1.2))[1][name].level == "good"
     assert "50 times the power of the noise: friction" in judged(pose(over_noise=50.0))[1][name].text
-    assert "one period tells no noise" in judged(pose(over_noise=None))[1][name].text
+    assert "one period shows no noise" in judged(pose(over_noise=None))[1][name].text
 
 
 @pytest.mark.parametrize(("error", "level"), [(1.05, "good"), (1.3, "warn"), (2.0, "bad")])
@@ -83,14 +83,14 @@ def test_a_realisation_that_the_others_do_not_predict_is_a_warning(error, level)
 
 def test_poses_that_tell_other_values_are_named():
     verdict, checks = judged(poses={"P1": Agreement(90.0, 22), "P3": Agreement(15.0, 22)})
-    text = checks["Recordings that tell the same values"].text
+    text = checks["Recordings that agree on the values"].text
     assert verdict.level == "bad" and "others: P1, chi-square 90.0 for 22" in text and "P3" not in text
 
 
 def test_one_recording_has_nothing_to_be_compared_with():
     verdict, checks = judged(poses={}, realisations={}, heldout=None)
     assert verdict.level == "good"
-    assert "nothing to compare" in checks["Recordings that tell the same values"].text
+    assert "nothing to compare" in checks["Recordings that agree on the values"].text
     assert "record another" in checks["A realisation that others predict"].text
 
 

@@ -72,14 +72,14 @@ def _check_clock(name: str, samples: TimedSamples) -> None:
         k = int(np.argmax(np.diff(newest))) + 1
         raise RecordingError(
             f"{name}: the stamps jump forward by {duration(ahead.max() / 1e9)} at message {k}, and the times of "
-            f"reception do not tell why; expected one clock without jumps: {CUT}"
+            f"reception do not explain why; expected one clock without jumps: {CUT}"
         )
     steps = np.diff(stamps)
     back = int(np.argmin(steps)) + 1 if len(steps) else 0
     if late.max() > LATE_ALLOWED * 1e9 or _runs_twice(stamps, late > 0):
         raise RecordingError(
             f"{name}: the stamps go back by {duration(steps[back - 1] / 1e9)} at message {back} and do not recover, "
-            f"and the times of reception do not tell why; expected one clock without jumps: {CUT}"
+            f"and the times of reception do not explain why; expected one clock without jumps: {CUT}"
         )
 
 

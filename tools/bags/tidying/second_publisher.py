@@ -91,7 +91,7 @@ def _refuse_mixed(name: str, channels: tuple[str, ...], samples: TimedSamples) -
         size = float(np.median(there[jumps[:, worst], worst]))
         raise RecordingError(
             f"{channels[worst]} jumps to and fro by {size:.4g} {counts[worst]} times in {len(samples)} messages of "
-            f"{name}: two nodes publish on this topic, and nothing tells which is right, or the clock of the recorder "
+            f"{name}: two nodes publish on this topic, and nothing shows which is right, or the clock of the recorder "
             "was set back, so that two stretches lie on each other; expected one node and one clock: find nodes with "
             "`ros2 topic info -v TOPIC`, and record again"
         )

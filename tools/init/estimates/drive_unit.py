@@ -47,17 +47,17 @@ def drive_unit(
         return "N m", f"{size}; without masses in the URDF all values are per unit of the command, whatever it is"
     if not told and heavy and not small:
         why = f"N m would be too little for the masses of {', '.join(heavy)} in the URDF"
-        return "A", f"{size}; {why}; the recording does not tell how much torque it makes{_volts(largest)}"
+        return "A", f"{size}; {why}; the recording does not show how much torque it makes{_volts(largest)}"
     if not told:
-        text = "volts cannot be told from it" if small else f"A or V would be possible{_too_large(largest)}"
-        return ("duty" if small else "N m"), f"{size}; the recording does not tell how much torque it makes; {text}"
+        text = "volts cannot be told apart from it" if small else f"A or V would be possible{_too_large(largest)}"
+        return ("duty" if small else "N m"), f"{size}; the recording does not show how much torque it makes; {text}"
     one = [joint for joint, gain in told.items() if _is_one(gain)]
     constants = ", ".join(f"{gain.value:.3g} ({joint})" for joint, gain in told.items())
     if len(one) == len(told) and (not small or len(told) > 1 or _near(next(iter(told.values())), ONE_DRIVE)):
         one_unit = f"one unit is {_range(list(told.values()))} N m on {_of(joints, told)}"
         return "N m", f"with the masses of the URDF {one_unit}{_off(told)}"
     if small:
-        return "duty", f"{size}, and one unit makes {constants} N m; volts cannot be told from it"
+        return "duty", f"{size}, and one unit makes {constants} N m; volts cannot be told apart from it"
     mixed = f"; {', '.join(one)} could be N m: if so, check the masses beyond the others" if one else ""
     alike = f"; alike on all joints: or torques before gears of that ratio ({_ratio(told)})" if _all_alike(told) else ""
     others = f"{_volts(largest)}{alike}{mixed}"

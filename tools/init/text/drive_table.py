@@ -47,7 +47,7 @@ def drive_table(guess: RobotGuess) -> list[str]:
     lines = ["  ".join(text.ljust(width) for text, width in zip(row, widths, strict=True)).rstrip() for row in rows]
     if any(UNKNOWN in row for row in rows):
         lines.append(
-            f"{UNKNOWN}: the recording does not tell it; where the robot file has it, it is a guess and says so"
+            f"{UNKNOWN}: the recording does not determine it; where the robot file has it, it is a guess and says so"
         )
     if any(IMPOSSIBLE_CELL in cell for row in rows for cell in row):
         lines.append(

@@ -9,7 +9,7 @@ from jointscope.tools.init.estimates.target_places import PLACE, TURN, GuessedTa
 from jointscope.tools.init.text.robot_line import as_list, line, number
 from jointscope.tools.init.text.source_text import sigma_line
 
-HELD = "the motion does not tell it from the others of this target; held where it was fitted"
+HELD = "the motion does not separate it from the others of this target; held where it was fitted"
 
 
 def target_lines(target: GuessedTarget) -> list[str]:

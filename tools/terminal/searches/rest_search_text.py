@@ -66,7 +66,7 @@ def loads_said(candidates: Sequence[RestCandidate]) -> str:
         return f" The loads are {value} +- {off} of what /load says."
     others = ", ".join(c.label for c in candidates if c.verdict == "missing")
     instead = f"in place of {others} " if others else ""
-    return f" Or {instead}the loads are {value} +- {off} of what /load says: these rests hardly tell which."
+    return f" Or {instead}the loads are {value} +- {off} of what /load says: these rests can hardly decide which."
 
 
 def ranking_text(found: RestDiscovery) -> str:

@@ -70,7 +70,7 @@ def _guessed(result: CalibrationResult, doubtful: list[ParameterEstimate]) -> st
         return ""
     joints = ", ".join(dict.fromkeys(p.name.rsplit(".", 1)[0] for p in guessed))
     return (
-        f"The recordings tell nothing of {', '.join(p.name for p in guessed[:4])}"
+        f"The recordings determine nothing about {', '.join(p.name for p in guessed[:4])}"
         f"{f' and {len(guessed) - 4} more' if len(guessed) > 4 else ''}: what stands there is a guess of the robot "
         f"file, and so is its sigma. Hold one value of {joints} that you know with `fixed: true`, or leave the "
         "joint out of the robot."

@@ -75,8 +75,8 @@ def unchecked(seen: SeenRests) -> str:
             parts.append(f"{what} by {'anything' if all_of_it else share}")
     gains = any(p.name.rpartition(".")[2] == seen.robot.drive_gain for p in seen.parameters)
     said = [
-        "Friction is told; masses and loads are those of the URDF and of /load, and these rests would not show it if "
-        f"one of them were off alone: {', '.join(parts)}" * bool(parts),
+        "Friction is known; masses and loads are those of the URDF and of /load, and these rests would not show it "
+        f"if one of them were off alone: {', '.join(parts)}" * bool(parts),
         "Torque constants are on the scale of masses and loads: all of these off by one share would not show"
         * (gains and bool(seen.unnoticed)),
         "More postures and weights, with every joint moved before each rest, show more" * bool(parts),

@@ -40,7 +40,7 @@ def verdict(result: RestCalibration) -> str:
             few = f"{counted(result.count, 'rest')} for {values} values of {owner}"
             return f"{NO}: {few}; nothing could contradict them."
     if not result.parameters and len(seen.stood) == len(result.robot.joints):
-        return f"{NO}: these rests tell no value; {standing(seen)}."
+        return f"{NO}: these rests determine no value; {standing(seen)}."
     if doubt := open_gains(seen):
         return f"{USABLE}: {doubt}."
     values_of, silent = result.robot.parameters, standing(seen) or from_one_side(seen)
@@ -49,7 +49,9 @@ def verdict(result: RestCalibration) -> str:
     if loose:
         names = ", ".join(f"{p.name} ({relative_sigma(p.sigma / abs(p.value))})" for p in loose)
         so = NO if len(loose) == len(told) else USABLE
-        return f"{so}: these rests hardly tell {names}; let it rest {_more(result, loose)}{silent and f'; {silent}'}."
+        return (
+            f"{so}: these rests hardly determine {names}; let it rest {_more(result, loose)}{silent and f'; {silent}'}."
+        )
     if silent:
         return f"{USABLE}: {silent}."
     if result.errors.error > AS_EXPECTED or _widened(seen)[1] > WIDENED:

@@ -25,7 +25,7 @@ def unit_of(*gains, largest=20.0, sigma=0.01, **more):
         ((16.4, 6.07, 0.742), 5.0, "A", "16.4 (hip), 6.07 (knee), 0.742 (foot) N m, not 1; volts look the same"),
         ((100.0, 100.2, 99.9), 5.0, "A", "torques before gears of that ratio (unit N m, scale 100)"),
         ((1.0, 1.0, 2.0), 5.0, "A", "hip, knee could be N m: if so, check the masses beyond the others"),
-        ((243.0, 69.5, 9.2), 0.34, "duty", "volts cannot be told from it"),
+        ((243.0, 69.5, 9.2), 0.34, "duty", "volts cannot be told apart from it"),
         ((0.5,), 0.9, "duty", "one unit makes 0.5 (hip) N m"),
         ((1.2,), 0.9, "duty", "one unit makes 1.2 (hip) N m"),
         ((1.02,), 0.9, "N m", "one unit is 1.02 N m on every joint"),
@@ -53,7 +53,7 @@ def test_a_joint_that_tells_nothing_does_not_vote():
 def test_without_an_answer_the_size_decides_and_that_is_said():
     assert unit_of(None, None, largest=0.9)[0] == "duty"
     unit, reason = unit_of(None, None, largest=30.0)
-    assert unit == "N m" and "the recording does not tell how much torque it makes" in reason
+    assert unit == "N m" and "the recording does not show how much torque it makes" in reason
     assert "volts hardly" in unit_of(None, largest=300.0)[1]
 
 

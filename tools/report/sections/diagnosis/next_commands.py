@@ -35,7 +35,7 @@ def after_diagnosis(result: Diagnosis) -> Section:
         blocks.append(("Add the first effect, calibrate, and see whether the error falls:", commands))
     better = edited_argument(result.robot, "better")
     discover = f"jointscope discover {robot} {bags}{held} -o {better} --report discovery.html"
-    blocks.append(("Or let the effects be added one by one, as long as the error falls:", [discover]))
+    blocks.append(("Or add effects one by one, as long as the error falls:", [discover]))
     return _section(blocks)
 
 

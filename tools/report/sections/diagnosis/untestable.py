@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What these recordings cannot tell, and which motion would show it."""
+"""What these recordings cannot show, and which motion would show it."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ def untestable(result: Diagnosis, id_: str = "untestable") -> Section:
     alike = [c for c in result.candidates if c.look_alikes and c.verdict in ("missing", "possible")]
     if alike:
         parts.append("<h3>Effects that look alike here</h3>" + _alike(alike))
-    return Section(id_, "What these recordings cannot tell", "".join(parts), lead)
+    return Section(id_, "What these recordings cannot show", "".join(parts), lead)
 
 
 def _weak(candidates: list[Candidate]) -> str:
