@@ -90,11 +90,13 @@ def told_of(
     some = []
     for joint, columns in all_columns.items():
         if columns is not None:
-            beside = rows.beside(joint, width, rows.with_own(joint, columns))
-            if beside is not None:
+            windows = rows.beside(joint, width, rows.with_own(joint, columns))
+            if windows is not None:
                 count = len(columns[0])
-                plain = fit(rows.robot, joint, beside[0][:, :-count]).left
-                some.append(SharedRows(joint, *beside, count, max(plain, 1e-300), rows.seconds(width, len(beside[0]))))
+                plain = fit(rows.robot, joint, windows[0][:, :-count]).left
+                some.append(
+                    SharedRows(joint, *windows, count, max(plain, 1e-300), rows.seconds(width, len(windows[0])))
+                )
     if not some:
         return []
     told = []
