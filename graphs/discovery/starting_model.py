@@ -7,7 +7,8 @@ too. A search that changed from one to the other when an effect came in would ta
 
 How sharply dry friction turns over is a number of the robot file that nobody measured. Where an encoder tells slower
 speeds from none, the recordings are asked for it before any effect is: what a friction that is rounded off too much
-leaves looks like one.
+leaves looks like one. Joints that truly stick contradict any rounded law where they stand, and bend the values of a
+model that is asked of it: one calibrated while they move then predicts better, and torques are asked, noisy or not.
 """
 
 from __future__ import annotations
@@ -61,7 +62,7 @@ def starting_model(robot: Robot, recordings: Sequence[Recording], solver: Solver
     """
     for recording in recordings:
         _refuse_mistaken(robot, recording)
-    return _as_sharp_as_told(_by_its_measure(robot, recordings, solver), solver)
+    return _by_its_measure(robot, recordings, solver)
 
 
 def _refuse_mistaken(robot: Robot, recording: Recording) -> None:
@@ -75,13 +76,32 @@ def _refuse_mistaken(robot: Robot, recording: Recording) -> None:
 
 
 def _by_its_measure(robot: Robot, recordings: Sequence[Recording], solver: Solver) -> BaseModel:
+    def by_predictions() -> BaseModel:
+        return _as_sharp_as_told(BaseModel.of(robot, recordings, by_torques=False, solver=solver), solver)
+
     if not seen_by_one_encoder(robot) or judged_by_loop(robot, recordings):
-        return BaseModel.of(robot, recordings, by_torques=False, solver=solver)
-    base = BaseModel.of(robot, recordings, by_torques=True, solver=solver)
-    judge = torque_judge(base)
+        return by_predictions()
+    moving = BaseModel.of(robot, recordings, by_torques=True, solver=solver)
+    judge = torque_judge(moving)
     if judge is not None and is_quiet(judge):
-        return base
-    return BaseModel.of(robot, recordings, by_torques=False, solver=solver)
+        return moving
+    standing = by_predictions()
+    return moving if judge is not None and _predicts_better(_as_sharp_as(standing, moving), standing) else standing
+
+
+def _as_sharp_as(other: BaseModel, base: BaseModel) -> BaseModel:
+    """A model with the sharpness that another one has, values as they are: each predicts by what suits it best."""
+    own = {joint: other.robot.sharpness_of(joint) for joint in base.robot.joints}
+    return replace(base, robot=with_sharpness(base.robot, own))
+
+
+def _predicts_better(model: BaseModel, than: BaseModel) -> bool:
+    """Whether the error of a model's predictions is clearly the smaller one, standstills included."""
+    try:
+        error, other = (judged_error(b, b.robot, b.calibrations, fit_and_judge(b)[1]).error for b in (model, than))
+    except JointscopeError:
+        return False
+    return error**2 < (1.0 - MATTERS) * other**2
 
 
 def _as_sharp_as_told(base: BaseModel, solver: Solver = solve) -> BaseModel:
@@ -100,10 +120,9 @@ def _as_sharp_as_told(base: BaseModel, solver: Solver = solve) -> BaseModel:
         held = {joint: min(found.sharpness_of(joint), most) for joint, most in told.items()}
         sharper = {joint: k for joint, k in held.items() if k > robot.sharpness_of(joint)}
         other = BaseModel.of(with_sharpness(robot, sharper), base.recordings, base, solver=solver)
-        before, after = (judged_error(b, b.robot, b.calibrations, fit_and_judge(b)[1]).error for b in (base, other))
     except JointscopeError:
         return base
-    return other if after**2 < (1.0 - MATTERS) * before**2 else base
+    return other if _predicts_better(other, base) else base
 
 
 def _told_sharpness(robot: Robot, recordings: Sequence[Recording]) -> dict[str, float]:

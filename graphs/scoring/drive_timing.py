@@ -75,11 +75,15 @@ class DriveTiming:
         if self.joint:
             return f"correct its stamps where they are made, or record {self.joint} with the others' clock and filter"
         output = edited_argument(robot, effect)
-        alike = " (a low-pass of the positions, encoder_filter, or of the drive, motor_lag, is late, too)"
-        return (
-            f"`jointscope add {robot_argument(robot)} {effect}@{OWNER} -o {output}`, then calibrate again"
-            f"{alike if self.delay > FILTERED and effect == EFFECT else ''}"
-        )
+        alike = ""
+        if self.delay > FILTERED and effect == EFFECT:
+            alike = " (a low-pass of the positions, encoder_filter, or of the drive, motor_lag, is late, too)"
+        elif self.delay < -FILTERED and robot.command_held and not robot.layout.motors:
+            alike = (
+                ", if its stamps are late: no command acts before it is sent. A motor whose link hangs on a spring or "
+                "in a gap moves early, too, where the file calls the joint rigid (joint_elasticity, backlash)"
+            )
+        return f"`jointscope add {robot_argument(robot)} {effect}@{OWNER} -o {output}`, then calibrate again{alike}"
 
     def moved(self, found: Mapping[str, Value]) -> list[str]:
         """Names of the values that the delay would change by much; none where it may be chance.

@@ -48,8 +48,9 @@ def what_is_missing(robot: Robot, recording: Recording, poor: Sequence[str]) -> 
     if (link := found.link) is not None:
         if link.turn:
             tilt = f", or the base seems not to be level ({TILT}@robot instead)" if link.tilted else ""
+            also = "".join(f", and that of {other} {angle:.2g} rad" for other, angle in link.beside)
             return (
-                f"the encoder of {link.joint} seems to read {link.turn:.2g} rad too much: jointscope add "
+                f"the encoder of {link.joint} seems to read {link.turn:.2g} rad too much{also}: jointscope add "
                 f"{robot_argument(robot)} {link.label} -o {edited_argument(robot, 'encoder_offset')}{tilt}"
             )
         carries = "weighs" if not link.moments else "has its centre of mass elsewhere and weighs"

@@ -101,13 +101,15 @@ def _other_zero(result: CalibrationResult, link: WrongLink) -> str:
     """What a joint moves seems to be turned about its axis: the zero of its encoder, most likely."""
     joint, output = link.joint, edited_argument(result.start, "encoder_offset")
     turned = f"in the URDF all behind {joint} is turned about its axis"
+    also = "".join(f", and that of {other} {significant(angle, 2)} rad" for other, angle in link.beside)
     others = [f"that of {other}" for other in link.alike]
     others += ["the base is not level: gravity_direction@robot"] * link.tilted
     return (
         f"By regression of all joints the encoder of {joint} reads {significant(link.turn, 2)} ± "
-        f"{significant(link.sigma, 1)} rad too much for the URDF (or {' or '.join([*others, turned])}, which looks the "
-        f"same): {_seen(link)}. Add it: `jointscope add {robot_argument(result.start)} {link.label} -o {output}`, "
-        f"then calibrate again; or correct the URDF, then {_again(result)}."
+        f"{significant(link.sigma, 1)} rad{also} too much for the URDF (or {' or '.join([*others, turned])}, which "
+        f"looks the same): {_seen(link)}. Add {'them' if also else 'it'}: `jointscope add "
+        f"{robot_argument(result.start)} {link.label} -o {output}`, then calibrate again; or correct the URDF, then "
+        f"{_again(result)}."
     )
 
 

@@ -73,7 +73,7 @@ def asked_by_regression(robot: Robot, recordings: Sequence[Recording], test: Sco
         return Asked()
     paths = [recording.path for recording in recordings]
     found = most_plausible(rows, paths, confirmed(regressed_causes(rows), test))
-    if found.link and not asked_for({found.link.label: {}}, test):
+    if found.link and not asked_for({label: {} for label in found.link.label.split()}, test):
         return Asked(late=found.late)
     return found if found.names else replace(found, load_frictions=load_frictions(rows))
 

@@ -9,6 +9,7 @@ Each joint keeps its own constant, rotor and friction.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -49,7 +50,14 @@ class SharedRows(NamedTuple):
 
 
 class Told(NamedTuple):
-    """What windows of one width say of one link; sizes is one for the mass alone."""
+    """What windows of one width say of one link, or of several together.
+
+    Attributes:
+        here: the first of them, with the sizes of all.
+        sizes: how many are found, one for the mass alone.
+        some, found, left, evidence: rows of each joint, sizes, mean squares that are left, and the evidence.
+        together: all of them.
+    """
 
     here: EffectHypothesis
     sizes: int
@@ -57,19 +65,38 @@ class Told(NamedTuple):
     found: Array
     left: list[float]
     evidence: float
+    together: tuple[EffectHypothesis, ...]
 
 
-def told_of(rows: JointRows, link: EffectHypothesis, width: float, counts: tuple[int, ...]) -> list[Told]:
-    """What windows of one width [s] say of a link, by so many of its sizes: of its mass, and of its first moments."""
-    all_columns = {joint: rows.columns(joint, link) for joint in range(rows.robot.n)}
+def told_of(
+    rows: JointRows,
+    link: EffectHypothesis,
+    width: float,
+    counts: tuple[int, ...],
+    beside: tuple[EffectHypothesis, ...] = (),
+) -> list[Told]:
+    """What windows of one width [s] say of a link, by so many of its sizes: of its mass, and of its first moments.
+
+    Args:
+        rows: of the regression.
+        link: what the joints share.
+        width: of windows [s].
+        counts: of sizes, those of all together.
+        beside: what else they share.
+    """
+    together = (link, *beside)
+    link = replace(link, sizes=tuple(size for one in together for size in one.sizes))
+    all_columns = {joint: _columns(rows, joint, together) for joint in range(rows.robot.n)}
     some = []
     for joint, columns in all_columns.items():
         if columns is not None:
-            beside = rows.beside(joint, width, rows.with_own(joint, columns))
-            if beside is not None:
+            windows = rows.beside(joint, width, rows.with_own(joint, columns))
+            if windows is not None:
                 count = len(columns[0])
-                plain = fit(rows.robot, joint, beside[0][:, :-count]).left
-                some.append(SharedRows(joint, *beside, count, max(plain, 1e-300), rows.seconds(width, len(beside[0]))))
+                plain = fit(rows.robot, joint, windows[0][:, :-count]).left
+                some.append(
+                    SharedRows(joint, *windows, count, max(plain, 1e-300), rows.seconds(width, len(windows[0])))
+                )
     if not some:
         return []
     told = []
@@ -78,8 +105,19 @@ def told_of(rows: JointRows, link: EffectHypothesis, width: float, counts: tuple
         found, left = solved(rows, link, kept)
         worth = [evidence(one.plain, share, one.seconds, 0) for one, share in zip(kept, left, strict=True)]
         cost = evidence(1.0, 1.0, max(one.seconds for one in kept), sizes)
-        told.append(Told(link, sizes, kept, found, left, sum(worth) + cost))
+        told.append(Told(link, sizes, kept, found, left, sum(worth) + cost, together))
     return told
+
+
+def _columns(rows: JointRows, joint: int, together: Sequence[EffectHypothesis]) -> list[list[Array]] | None:
+    """Columns of all in each recording, zero where one does not act on a joint; None where none does."""
+    found = [rows.columns(joint, one) for one in together]
+    if all(some is None for some in found):
+        return None
+    nothing = [[np.zeros_like(one) for one in some] for some in rows.constant()]
+    silent = [[some * len(link.sizes) for some in nothing] for link in together]
+    every = [none if some is None else some for some, none in zip(found, silent, strict=True)]
+    return [[column for some in parts for column in some] for parts in zip(*every, strict=True)]
 
 
 def solved(rows: JointRows, link: EffectHypothesis, some: Sequence[SharedRows]) -> tuple[Array, list[float]]:

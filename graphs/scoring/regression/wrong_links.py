@@ -6,7 +6,7 @@ r"""Which link weighs something else than the URDF says, by regression of all jo
 A heavier link shows in every joint that carries it, in the shape of its weight and of its acceleration. At one joint
 alone that may look like an offset, a gain that falls or a dead band; together joints tell. Mass alone comes before mass
 and first moments: a casting that is denser is what URDFs get wrong, and a load is elsewhere. A joint whose encoder
-counts from another zero (`turned_joints`) competes: weights behind it stand elsewhere, too.
+counts from another zero (`turned_joints`) competes, and so do several: weights behind them stand elsewhere, too.
 """
 
 from __future__ import annotations
@@ -48,6 +48,7 @@ class WrongLink:
     Attributes:
         joint: that moves it.
         turn: what the joint's encoder reads too much [rad]; zero where the link's mass is meant.
+        beside: other joints whose encoders have another zero as well, and what these read too much [rad].
         mass: by which it is heavier [kg].
         sigma: of that, or of the angle.
         share: the same, over what the URDF has.
@@ -76,11 +77,13 @@ class WrongLink:
     size: float
     with_it: Changes
     evidence: float
+    beside: tuple[tuple[str, float], ...] = ()
 
     @property
     def label(self) -> str:
-        """ID@JOINT of the effect that it is."""
-        return f"{TURN if self.turn else EFFECT}@{self.joint}"
+        """ID@JOINT of the effect that it is, of each where there are several."""
+        effect = TURN if self.turn else EFFECT
+        return " ".join(f"{effect}@{joint}" for joint in (self.joint, *(other for other, _ in self.beside)))
 
 
 def wrong_link(rows: JointRows, tilted: float) -> WrongLink | None:
@@ -160,7 +163,9 @@ def _sure(rows: JointRows, best: Told, as_good: Sequence[Told], *, tilted: bool,
     turned = best.here.here.effect.id == TURN
     mass, turn = (0.0, float(best.found[0])) if turned else (float(best.found[0]), 0.0)
     possible = body.mass + mass > -SURE * sigmas[0]
-    if not possible or np.max(np.abs(best.found) / np.maximum(sigmas, 1e-300)) < SURE:
+    clear = np.abs(best.found) / np.maximum(sigmas, 1e-300)
+    # of several zeros that are named each has to be sure; of a mass and its place one is enough
+    if not possible or (np.min(clear) if turned else np.max(clear)) < SURE:
         return None
     with_it: Changes = {}
     for one in best.some:
@@ -171,14 +176,15 @@ def _sure(rows: JointRows, best: Told, as_good: Sequence[Told], *, tilted: bool,
         return None
     kind = [one for one in as_good if one.here.here.effect == best.here.here.effect]
     alike = dict.fromkeys(one.here.here.owner for one in kind if one.sizes <= best.sizes)
-    alike.pop(best.here.here.owner, None)
+    owners = [one.here.owner for one in best.together]
+    alike = {joint: None for joint in alike if joint not in owners}
     return WrongLink(
         joint=best.here.here.owner,
         turn=turn,
         mass=mass,
         sigma=float(sigmas[0]),
         share=mass / body.mass if body.mass > 0.0 else np.inf,
-        moments=tuple(best.found[1:].tolist()),
+        moments=() if turned else tuple(best.found[1:].tolist()),
         alike=tuple(alike),
         tilted=tilted or (turned and _carries_all(robot, best.here.here.owner)),
         drives=drives,
@@ -187,4 +193,5 @@ def _sure(rows: JointRows, best: Told, as_good: Sequence[Told], *, tilted: bool,
         size=size,
         with_it=with_it,
         evidence=best.evidence,
+        beside=tuple(zip(owners[1:], best.found[1:].tolist(), strict=True)) if turned else (),
     )

@@ -1,13 +1,17 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""How sharply dry friction turns over is asked of the recordings before a search begins, and kept in the file."""
+"""How dry friction turns over is asked of the recordings before a search begins: how sharply, and whether it sticks."""
 
 from __future__ import annotations
 
+from dataclasses import replace
+
+import numpy as np
 import pytest
-from simulated_arm import SHARP, Arm, moved, robot_file
+from simulated_arm import SHARP, Arm, assert_right, moved, robot_file
 
 from jointscope.graphs.calibration.base_model import BaseModel
 from jointscope.graphs.discovery import starting_model as module
+from jointscope.graphs.discovery.starting_model import starting_model
 from jointscope.graphs.refits.validation import fit_and_judge, judged_error
 from jointscope.robots.files.robot_file import load_robot
 from jointscope.robots.files.robot_writer import robot_text
@@ -53,3 +57,20 @@ def test_models_judged_by_torques_are_not_asked(monkeypatch, robot):
     monkeypatch.setattr(module, "calibrate", None)
     assert module._told_sharpness(robot, base.recordings)
     assert module._as_sharp_as_told(base) is base
+
+
+def test_joints_that_truly_stick_do_not_bend_the_model_with_which_a_search_begins(tmp_path):
+    sticks = Arm("yx", inertia=(0.1, 0.05), dry=(2.0, 0.8), viscous=(0.9, 0.3))
+    encoder, command = moved(
+        sticks, encoder_rate=200.0, command_rate=200.0, counts=2**16, noise=0.0, pause=0.4, sticks=True
+    )
+    robot = load_robot(robot_file(sticks, tmp_path))
+    sigma = 2.0 * np.pi / 2**16 / np.sqrt(12.0)
+    robot = robot.with_sensors({"encoder": replace(robot.motor_encoder, sigmas=np.full(2, sigma))})
+    recordings = [Recording("sticks.mcap", "", 10**18, {"encoder": encoder, "command": command})]
+    base = starting_model(robot, recordings)
+    assert base.by_torques
+    assert_right(sticks, base.result.parameters, rel=0.01)
+    rounded = BaseModel.of(robot, recordings, by_torques=False)
+    with pytest.raises(AssertionError):  # what it would begin with if it believed the law at rest
+        assert_right(sticks, rounded.result.parameters, rel=0.01)

@@ -17,7 +17,7 @@ from jointscope.robots.recordings.recording import Notice
 def asked(monkeypatch):
     """What was calibrated for which measure, where a judge is as quiet as wanted."""
 
-    def ask(quiet, one_encoder=True, loop=False):
+    def ask(quiet, one_encoder=True, loop=False, sticks=False):
         calibrated = []
 
         def of(robot, recordings, by_torques, solver):
@@ -31,6 +31,8 @@ def asked(monkeypatch):
         monkeypatch.setattr(module, "is_quiet", lambda judge: quiet)
         monkeypatch.setattr(module, "screen_all", lambda recording, robot: [])
         monkeypatch.setattr(module, "_as_sharp_as_told", lambda base, solver: base)
+        monkeypatch.setattr(module, "_as_sharp_as", lambda other, base: base)
+        monkeypatch.setattr(module, "_predicts_better", lambda model, than: sticks)
         return starting_model("robot", ["recording"]).by_torques, calibrated
 
     return ask
@@ -58,6 +60,11 @@ def test_an_accelerometer_that_feels_another_gravity_ends_it_too(asked, monkeypa
 @pytest.mark.parametrize("quiet", (False, None))
 def test_where_encoders_do_not_tell_torques_standstills_come_back(asked, quiet):
     assert asked(quiet) == (False, [True, False])
+
+
+def test_where_standstill_contradicts_the_law_torques_are_asked_all_the_same(asked):
+    assert asked(False, sticks=True) == (True, [True, False])
+    assert asked(None, sticks=True) == (False, [True, False])
 
 
 def test_other_robots_are_calibrated_once(asked):

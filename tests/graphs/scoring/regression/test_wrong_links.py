@@ -154,3 +154,17 @@ def test_an_encoder_with_another_zero_is_not_taken_for_a_mass(robots, unit, join
 def test_a_tool_at_the_tip_is_not_another_zero(robots):
     link = asked(robots, drive=tool(0.5, (0.3, 0.0, 0.1))).link
     assert link.moments and not link.turn
+
+
+@pytest.mark.parametrize("offsets", [(0.0, 0.06, 0.09), (0.0, -0.05, 0.12), (0.08, -0.06, 0.0)])
+@pytest.mark.parametrize("unit", ["N m", "A"])
+def test_several_encoders_with_another_zero_are_named_together(robots, unit, offsets):
+    encoder, command = moved(ARM, **HOW)
+    if unit == "A":
+        command = divided(command, CONSTANTS)
+    encoder = replace(encoder, values=encoder.values + np.array(offsets))
+    rows = joint_rows(robots[unit], [Recording("arm.mcap", "", 0, {"encoder": encoder, "command": command})])
+    link = most_plausible(rows, ["arm.mcap"], regressed_causes(rows)).link
+    wrong = {joint: angle for joint, angle in zip(ARM.joints, offsets, strict=True) if angle}
+    assert {label.split("@")[0] for label in link.label.split()} == {"encoder_offset"}
+    assert {link.joint: link.turn} | dict(link.beside) == pytest.approx(wrong, abs=0.01)
