@@ -65,8 +65,7 @@ class WeakDirection:
     """A combination of parameters that the recording determines badly.
 
     Attributes:
-        weights: share of each parameter in the direction, largest first; relative changes for positive parameters,
-            absolute ones [unit] otherwise.
+        weights: share of each parameter, largest first; relative changes of positive ones, else absolute ones [unit].
         sigma: standard deviation along the direction: relative change of the leading parameter (or [rad], [rad/s]).
         text: one sentence with names and percentages.
     """
@@ -184,8 +183,7 @@ class CalibrationResult:
         derived: results in other words and units, which follow from the parameters.
         sets: recordings of other kinds with their states and the blocks that they touch.
         torque_readings: scales and offsets of torque sensors that the robot file has no parameters for.
-        inertia_shifts: what steps that are too long have made of each inertia, as a share of it, see
-            `graphs.problem.step_errors`; None where it was not asked.
+        inertia_shifts: share of each inertia that too long steps made (`graphs.problem.step_errors`); None unasked.
         exchanged: sentence about joints that have each other's commands or positions.
         odd_trackers: sentences about targets whose stamps seem to be late or early, or whose tracker moved, by sensor.
         misdescribed: sentence about a transmission or a drive signal that is another one than the robot file says.

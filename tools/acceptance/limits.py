@@ -37,7 +37,7 @@ QUANTITIES: Mapping[str, tuple[str, ...]] = {
     "poses": ("mean_mm", "p90_mm", "max_mm", "rms_mm", "mean_mrad", "p90_mrad", "max_mrad", "rms_mrad"),
 }
 """What can be limited, by what it is of."""
-_OWN_UNITS = {"percent": "%", "mm": "mm", "chi2": "1"}
+_OWN_UNITS = {"percent": "%", "mm": "mm", "mrad": "mrad", "chi2": "1"}
 
 
 def own_unit(quantity: str) -> str | None:

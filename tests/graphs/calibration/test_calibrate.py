@@ -194,7 +194,7 @@ def test_json_has_the_promised_content(clean):
     assert set(content["parameters"]["joint1.stiffness"]) == {"value", "sigma", "unit"}
     assert np.shape(content["parameters"]["imu1.R_imu_body"]["value"]) == (3, 3)
     assert np.shape(content["parameters"]["imu2.bias"]["value"]) == (3,)
-    assert set(content["channels"]["joint1.motor_position"]) == {"rmse", "sigma", "chi2"}
+    assert set(content["channels"]["joint1.motor_position"]) == {"rmse", "sigma", "chi2", "unit"}
     assert content["weak_directions"][0]["parameters"] == {"imu1.R_imu_body.z": pytest.approx(1.0)}
     keys = {"iterations", "samples", "recording_seconds", "wall_seconds", "cost", "noise"}
     assert keys <= set(content)

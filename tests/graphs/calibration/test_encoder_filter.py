@@ -62,7 +62,7 @@ def test_a_filter_is_named_beside_the_delay_that_hides_it_and_makes_the_values_r
     wrong = calibrated(late, smoothed, command)
     assert any(abs(share) > 0.01 and abs(sigmas) > 3.5 for share, sigmas in deviations(wrong)), "the filter must harm"
     assert check(wrong).level == "bad" and judge(wrong).level == "bad"
-    assert "The recording asks for encoder_filter@robot" in check(wrong).text
+    assert "The recording calls for encoder_filter@robot" in check(wrong).text
     file = str(robot.path).removesuffix(".yaml")
     assert f"`jointscope add {file}.yaml encoder_filter@robot -o {file}_encoder_filter.yaml`" in check(wrong).text
     mended = calibrated(add_effect(late, "encoder_filter@robot"), smoothed, command)

@@ -90,7 +90,7 @@ def test_rests_too_few_to_tell_the_spring_are_no_yes(tmp_path):
     share = {"swing.stiffness": 0.5, "swing.coulomb_torque": 0.1}
     loose = tuple(replace(p, sigma=share.get(p.name, 0.0) * p.value) for p in few.parameters)
     said = verdict(replace(few, parameters=loose, problems=few.problems * 2))
-    assert said.startswith("Usable") and "these rests hardly tell swing.stiffness (+-50 %);" in said
+    assert said.startswith("Usable") and "these rests hardly determine swing.stiffness (+-50 %);" in said
 
 
 def test_gradients_are_those_of_differences(tmp_path):

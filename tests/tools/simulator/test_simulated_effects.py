@@ -224,7 +224,7 @@ def test_help_lists_every_effect_once(capsys):
     add_parser(parser.add_subparsers())
     with pytest.raises(SystemExit):
         parser.parse_args(["simulate", "--help"])
-    words = capsys.readouterr().out.split("effects that the catalogue knows")[1].replace(",", " ").split()
+    words = capsys.readouterr().out.split("effects of the catalogue, by owner:")[1].replace(",", " ").split()
     for effect_id in simulated_effects():
         assert words.count(effect_id) == 1
     assert max(map(len, effect_list().splitlines())) <= 100

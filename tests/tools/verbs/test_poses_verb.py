@@ -97,7 +97,7 @@ def test_a_calibrated_file_is_the_start_of_the_next_calibration(calibrated, tmp_
         ),
         (["calibrate", "doggy", "--poses", "p.csv", "-o", "a.yaml"], "doggy.yaml has no section `poses`"),
         (["info", "x.mcap", "--robot", "tx90l"], "it describes poses and frequency; give them with --poses"),
-        (["calibrate", "doggy", "x.mcap", "--urdf", "a.urdf", "-o", "a.yaml"], "--urdf writes the geometry that poses"),
+        (["calibrate", "doggy", "x.mcap", "--urdf", "a.urdf", "-o", "a.yaml"], "--urdf writes the geometry found"),
     ],
 )
 def test_what_does_not_go_together_is_one_line(tmp_path, monkeypatch, capsys, arguments, told):

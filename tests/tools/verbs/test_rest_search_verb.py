@@ -45,7 +45,7 @@ def test_what_does_not_go_together_is_refused_in_one_line(options, text, tmp_pat
 def test_limits_go_with_calibrate_and_compare(tmp_path, capsys):
     limits = tmp_path / "limits.yaml"
     limits.write_text(
-        "limits:\n  - {parameter: joint1.stiffness, at_least: 0.1 N/m, because: rope}\n", encoding="utf-8"
+        "limits:\n  - {parameter: joint1.stiffness, at_least: 0.1 N m/rad, because: rope}\n", encoding="utf-8"
     )
     code = main(["diagnose", "biorob", "--rests", str(SPRING1), "--accept", str(limits)])
     assert code == 1 and "--accept" in capsys.readouterr().err
