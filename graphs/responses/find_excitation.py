@@ -124,8 +124,21 @@ def _repeats(u: Array, N: int) -> list[tuple[int, int]]:
         if periods > 1:
             middle = (a + b + N) // 2  # windows at both ends hold a part of something else
             start = min(max(middle - periods * N // 2, 0), max(len(u) - periods * N, 0))
-            found.append((int(start), min(periods, len(u) // N)))
+            periods = min(periods, len(u) // N)
+            found.append((_exactly(u, N, int(start), periods, width), periods))
     return found
+
+
+def _exactly(u: Array, N: int, start: int, periods: int, width: int) -> int:
+    """The first sample near `start` from which the periods are the most alike: a window sees not what begins in it.
+
+    Three samples of the next experiment in 1000 are an error of 5 % at every line.
+    """
+    change = np.concatenate([[0.0], np.cumsum(np.sum((u[N:] - u[:-N]) ** 2, axis=1))])
+    starts = np.arange(max(start - width, 0), min(start + width, len(u) - periods * N) + 1)
+    left = change[starts + (periods - 1) * N] - change[starts]
+    same = left <= np.min(left) + EXACTLY * float(np.mean(np.sum(u**2, axis=1)))
+    return int(starts[same][np.argmin(np.abs(starts[same] - start))])
 
 
 def _lines(spectra: NDArray[Any]) -> NDArray[np.intp]:
