@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.signal import find_peaks
 
+from jointscope.graphs.responses.spectra import weak_lines
 from jointscope.robots.errors import RecordingError
 from jointscope.robots.recordings.signals import Excitation, Experiment, Signal
 
@@ -59,10 +60,13 @@ def find_excitation(drive: Signal, inputs: int, path: str) -> Excitation:
     found = [(s[a], count) for s in stretches for a, count in _repeats(u[s], N)]
     if not found:
         raise NoPeriodsError(_no_periods(path))
-    spectra = np.array(
-        [np.fft.rfft(u[a : a + count * N].reshape(count, N, -1).mean(axis=0), axis=0) for a, count in found]
-    )
+    each = [np.fft.rfft(u[a : a + count * N].reshape(count, N, -1), axis=1) for a, count in found]
+    spectra = np.array([periods.mean(axis=0) for periods in each])
     lines = _lines(spectra)
+    fewest = min(count for _, count in found)
+    weak = weak_lines(np.array([periods[:fewest] for periods in each]), lines)
+    if len(weak) < 0.5 * len(lines):  # of a measured signal some may be noise of the sensor
+        lines = np.setdiff1d(lines, weak)
     labels = _labels(spectra[:, lines], inputs)
     experiments = tuple(
         Experiment(*label, start=float(drive.times[a]), periods=count)

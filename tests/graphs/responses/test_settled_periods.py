@@ -76,3 +76,11 @@ def test_a_bench_that_was_recorded_steady_keeps_its_periods():
     drive = Signal(t, z["iq_refx"].reshape(-1, 1).astype(float), ("current",))
     excitation = settled(Signals("A", "", current, speed), find_excitation(drive, 1, "A"))
     assert all(e.transient <= 1 for e in excitation.experiments)
+
+
+@pytest.mark.skipif(not BENCH.is_dir(), reason="shared/data/real is not beside the project")
+def test_the_lines_of_a_measured_current_are_those_that_were_excited():
+    z = np.load(BENCH / "two_mass_multisine_A.npz")
+    current = z["iq_adx"].reshape(-1, 1).astype(float)[:25000]
+    found = find_excitation(Signal(np.arange(len(current)) / float(z["rate_hz"]), current, ("current",)), 1, "A")
+    np.testing.assert_array_equal(found.lines, np.arange(11, 251))
