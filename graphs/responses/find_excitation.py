@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.signal import find_peaks
 
+from jointscope.graphs.responses.spectra import weak_lines
 from jointscope.robots.errors import RecordingError
 from jointscope.robots.recordings.signals import Excitation, Experiment, Signal
 
@@ -59,10 +60,13 @@ def find_excitation(drive: Signal, inputs: int, path: str) -> Excitation:
     found = [(s[a], count) for s in stretches for a, count in _repeats(u[s], N)]
     if not found:
         raise NoPeriodsError(_no_periods(path))
-    spectra = np.array(
-        [np.fft.rfft(u[a : a + count * N].reshape(count, N, -1).mean(axis=0), axis=0) for a, count in found]
-    )
+    each = [np.fft.rfft(u[a : a + count * N].reshape(count, N, -1), axis=1) for a, count in found]
+    spectra = np.array([periods.mean(axis=0) for periods in each])
     lines = _lines(spectra)
+    fewest = min(count for _, count in found)
+    weak = weak_lines(np.array([periods[:fewest] for periods in each]), lines)
+    if len(weak) < 0.5 * len(lines):  # of a measured signal some may be noise of the sensor
+        lines = np.setdiff1d(lines, weak)
     labels = _labels(spectra[:, lines], inputs)
     experiments = tuple(
         Experiment(*label, start=float(drive.times[a]), periods=count)
@@ -124,8 +128,21 @@ def _repeats(u: Array, N: int) -> list[tuple[int, int]]:
         if periods > 1:
             middle = (a + b + N) // 2  # windows at both ends hold a part of something else
             start = min(max(middle - periods * N // 2, 0), max(len(u) - periods * N, 0))
-            found.append((int(start), min(periods, len(u) // N)))
+            periods = min(periods, len(u) // N)
+            found.append((_exactly(u, N, int(start), periods, width), periods))
     return found
+
+
+def _exactly(u: Array, N: int, start: int, periods: int, width: int) -> int:
+    """The first sample near `start` from which the periods are the most alike: a window sees not what begins in it.
+
+    Three samples of the next experiment in 1000 are an error of 5 % at every line.
+    """
+    change = np.concatenate([[0.0], np.cumsum(np.sum((u[N:] - u[:-N]) ** 2, axis=1))])
+    starts = np.arange(max(start - width, 0), min(start + width, len(u) - periods * N) + 1)
+    left = change[starts + (periods - 1) * N] - change[starts]
+    same = left <= np.min(left) + EXACTLY * float(np.mean(np.sum(u**2, axis=1)))
+    return int(starts[same][np.argmin(np.abs(starts[same] - start))])
 
 
 def _lines(spectra: NDArray[Any]) -> NDArray[np.intp]:

@@ -172,13 +172,7 @@ def _check_excited(found: Spectra) -> None:
         RecordingError: it does not.
     """
     lines = found.excitation.lines
-    size = np.sqrt(np.mean(np.abs(found.U) ** 2, axis=(0, 1)))
-    between = np.setdiff1d(np.arange(1, min(int(lines.max()) + 2, len(size))), lines)
-    floor = np.median(size[between], axis=0) if len(between) > 2 else np.zeros(size.shape[1])
-    if found.periods > 1:
-        change = np.sqrt(np.mean(np.var(found.U, axis=1, ddof=1), axis=0))
-        floor = np.maximum(floor, np.median(change[lines], axis=0))
-    weak = [int(k) for k in lines if np.all(size[k] <= EXCITED * floor)]
+    weak = weak_lines(found.U, lines)
     if len(weak) > 0.5 * len(lines):
         raise RecordingError(
             f"{found.path}: {len(weak)} of {len(lines)} lines of {found.excitation.source} are not excited; it belongs "
@@ -190,3 +184,19 @@ def _check_excited(found: Spectra) -> None:
             + (f" and {len(weak) - 1} more" if len(weak) > 1 else "")
             + f"; take it out of the lines of {found.excitation.source}"
         )
+
+
+def weak_lines(U: Complex, lines: NDArray[np.intp]) -> list[int]:
+    """Lines that do not stand out of what is between them, or of what changes from period to period.
+
+    Args:
+        U: spectra, shape (e, p, K, nu).
+        lines: that were excited.
+    """
+    size = np.sqrt(np.mean(np.abs(U) ** 2, axis=(0, 1)))
+    between = np.setdiff1d(np.arange(1, min(int(lines.max()) + 2, len(size))), lines)
+    floor = np.median(size[between], axis=0) if len(between) > 2 else np.zeros(size.shape[1])
+    if U.shape[1] > 1:
+        change = np.sqrt(np.mean(np.var(U, axis=1, ddof=1), axis=0))
+        floor = np.maximum(floor, np.median(change[lines], axis=0))
+    return [int(k) for k in lines if np.all(size[k] <= EXCITED * floor)]

@@ -136,7 +136,7 @@ class Notice:
     text: str
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Recording:
     """All streams of one bag.
 
@@ -165,6 +165,12 @@ class Recording:
     sticking: Mapping[str, tuple[tuple[float, float], ...]] = field(default_factory=dict)
     posture: Mapping[str, float] = field(default_factory=dict)
     shortened: bool = False
+
+    def __repr__(self) -> str:
+        """One line: "train.mcap: 16.000 s; command (16000 samples, 3 channels), imu1 (16000 samples, 3 channels)"."""
+        streams = [f"{s.name} ({len(s)} samples, {len(s.channels)} channels)" for s in self.streams.values()]
+        length = f"{self.duration:.3f} s" if any(map(len, self.streams.values())) else "empty"
+        return f"{self.path}: {length}; {', '.join(streams)}"
 
     @property
     def command(self) -> Stream:

@@ -15,6 +15,7 @@ from fnmatch import fnmatchcase
 from types import MappingProxyType
 from typing import Any
 
+from jointscope.graphs.comparison.predictions_ahead import HORIZONS
 from jointscope.robots.parts.parameter import Parameter
 from jointscope.robots.yaml_section import did_you_mean
 from jointscope.tools.acceptance.limits import RANGES, Limit
@@ -22,6 +23,7 @@ from jointscope.tools.acceptance.limits import RANGES, Limit
 PASS, FAIL, OPEN = "pass", "fail", "not evaluated"
 FAILED, UNDECIDED = 3, 4  # exit codes
 CERTAIN = 2.0  # sigma
+AXES = "xyz"
 TABLES = {"parameter": "parameters", "channel": "channels", "joint": "missing_torque_percent"}
 """Where in the JSON the names of a subject stand."""
 NO_TORQUE = (
@@ -125,12 +127,29 @@ def _check(limit: Limit, content: Mapping[str, Any]) -> Iterator[Checked]:
         nothing = f"this result has no {TABLES[limit.subject]}"
         yield Checked(limit, limit.pattern, OPEN, NO_TORQUE if limit.subject == "joint" else nothing)
         return
+    if limit.subject == "parameter":
+        table = dict(_single_numbers(table, limit.pattern))
     names = [name for name in table if fnmatchcase(name, limit.pattern)]
     for name in names:
         yield _judged(limit, name, _READ[limit.subject](limit, name, table[name]))
     if not names:
         near = did_you_mean(limit.pattern, set(table))
         yield Checked(limit, limit.pattern, OPEN, f"there is no such {limit.subject}{near}")
+
+
+def _single_numbers(table: Mapping[str, Any], pattern: str) -> Iterator[tuple[str, Mapping[str, Any]]]:
+    """Parameters as the screen names them: of biases and mountings the three axes, unless they are named as a whole.
+
+    A mounting is a matrix, with sigmas of three angles: these can be limited, the angles themselves are nowhere.
+    """
+    for name, entry in table.items():
+        values = entry["value"]
+        if not isinstance(values, list) or len(values) != len(AXES) or name == pattern:
+            yield name, entry
+            continue
+        for axis, value, sigma in zip(AXES, values, entry["sigma"] or [None] * len(AXES), strict=True):
+            unit = "rad" if isinstance(value, list) else entry["unit"]
+            yield f"{name}.{axis}", {"value": value, "sigma": sigma, "unit": unit}
 
 
 def _judged(limit: Limit, name: str, found: _Found) -> Checked:
@@ -145,7 +164,9 @@ def _judged(limit: Limit, name: str, found: _Found) -> Checked:
     text += f", {found.remark}" if found.remark else ""
     if not limit.lower <= value <= limit.upper:
         return Checked(limit, name, FAIL, text)
-    if value - spread < limit.lower or value + spread > limit.upper:
+    if not (
+        limit.lower <= value - spread and value + spread <= limit.upper
+    ):  # a sigma that is no number passes nowhere
         return Checked(limit, name, OPEN, f"{text}: two sigma reach beyond the limit")
     return Checked(limit, name, PASS, text)
 
@@ -156,10 +177,14 @@ def _in(unit: str) -> str:
 
 def _of_parameter(limit: Limit, name: str, entry: Mapping[str, Any]) -> _Found:
     value, sigma, unit = entry["value"], entry["sigma"], entry["unit"]
-    if not isinstance(value, int | float):
-        return _Found(missing="it is no single number")
+    if isinstance(value, list) and limit.quantity == "sigma" and isinstance(sigma, int | float):
+        return _Found(sigma, unit)
     if sigma is None:
         return _Found(missing="it was held, not calibrated")
+    if not isinstance(value, int | float):
+        axes = ", ".join(f"{name}.{axis}" for axis in AXES)
+        which = f": its sigma can be limited, in {unit}" if isinstance(sigma, int | float) else f": name one of {axes}"
+        return _Found(missing=f"it is no single number{which}")
     if limit.quantity in RANGES:
         return _Found(value, unit, sigma)
     if limit.quantity.startswith("sigma"):
@@ -199,7 +224,12 @@ def _of_channel(limit: Limit, _: str, entry: Mapping[str, Any]) -> _Found:
     if limit.quantity == "error":
         horizons = entry.get("horizons", {})
         if limit.horizon not in horizons:
-            known = f"; horizons are {', '.join(horizons)}" if horizons else "; `jointscope compare` has it"
+            ahead = ", ".join(map(str, HORIZONS))
+            known = (
+                f"; horizons are {', '.join(horizons)}"
+                if horizons
+                else f"; `jointscope compare` has {ahead}, open_loop"
+            )
             asked = "in the open loop" if limit.horizon == "open_loop" else f"{limit.horizon} s ahead"
             return _Found(missing=f"this result has no error {asked}{known}")
         return _number(horizons[limit.horizon], entry.get("unit", ""))

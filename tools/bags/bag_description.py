@@ -87,7 +87,7 @@ class NeedDescription:
     candidates: tuple[str, ...]
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class BagDescription:
     """A bag, and how it fits a robot.
 
@@ -124,6 +124,10 @@ class BagDescription:
         plain = _plain(asdict(self))
         assert isinstance(plain, dict)
         return plain
+
+    def __repr__(self) -> str:
+        """What `print` shows."""
+        return self.text()
 
     def text(self) -> str:
         """The description as a table."""

@@ -22,7 +22,7 @@ WIDTH = 110
 FORMATS = {"urdf": urdf_model, "mjcf": mujoco_model}
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class ExportedFiles:
     """What was written, and what the formats cannot hold.
 
@@ -43,6 +43,10 @@ class ExportedFiles:
     def to_json(self) -> dict[str, Any]:
         """The same for machines."""
         return {"robot": self.robot, **{kind: exported.to_json() for kind, exported in self.models.items()}}
+
+    def __repr__(self) -> str:
+        """What `print` shows."""
+        return self.answer()
 
     def _repr_html_(self) -> str:
         """What a notebook shows."""

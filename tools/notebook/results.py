@@ -23,6 +23,7 @@ from jointscope.tools.presentation.model_answer import diagnosis_answer, discove
 from jointscope.tools.presentation.numbers import significant
 from jointscope.tools.report.page.acceptance import acceptance
 from jointscope.tools.simulator.simulation import Simulation
+from jointscope.tools.terminal.acceptance_text import acceptance_text
 from jointscope.tools.verb_parts import result_files
 from jointscope.tools.verb_parts.result_files import ResultFiles
 from jointscope.tools.verdicts.judgement import Judgement, judge
@@ -42,7 +43,7 @@ class _Found(Shown):
         return cls(**{field.name: getattr(found, field.name) for field in fields(found)}, **more)
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True, kw_only=True, repr=False)
 class _Limited(_Found):
     """A result that may be held against limits.
 
@@ -62,8 +63,12 @@ class _Limited(_Found):
         """What a notebook shows, the limits below."""
         return super()._repr_html_() + "".join(section.body for section in acceptance(self.acceptance))
 
+    def __repr__(self) -> str:
+        """What `print` shows, the limits below."""
+        return f"{super().__repr__()}\n{acceptance_text(self.acceptance)}".rstrip()
 
-@dataclass(frozen=True)
+
+@dataclass(frozen=True, repr=False)
 class Calibrated(_Limited, CalibrationResult):
     """A calibration; `result["joint1.stiffness"]` is one of its parameters or derived results."""
 
@@ -111,7 +116,7 @@ class Calibrated(_Limited, CalibrationResult):
         result_files.write_calibration(self, files, self.acceptance)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Compared(_Limited, ComparisonResult):
     """Models against a recording."""
 
@@ -154,7 +159,7 @@ class Compared(_Limited, ComparisonResult):
         result_files.write_comparison(self, files, self.acceptance)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Diagnosed(_Limited, Diagnosis):
     """Effects that a model may lack."""
 
@@ -188,7 +193,7 @@ class Diagnosed(_Limited, Diagnosis):
         result_files.write_diagnosis(self, files, self.acceptance)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Discovered(_Found, Discovery):
     """The way to a model that lacks nothing, step by step; `robot` is the last one."""
 
@@ -199,13 +204,8 @@ class Discovered(_Found, Discovery):
     def rows(self) -> list[Row]:
         """A record for each step."""
         return [
-            {
-                "step": step.label,
-                "train_error": step.train_error,
-                "heldout_error": step.heldout_error,
-                "floor": step.floor,
-            }
-            for step in self.steps
+            {"step": s.label, "train_error": s.train_error, "heldout_error": s.heldout_error, "floor": s.floor}
+            for s in self.steps
         ]
 
     def draw(self, axes: Any) -> None:
@@ -224,7 +224,7 @@ class Discovered(_Found, Discovery):
         result_files.write_discovery(self, files, self.steps[0].robot.path.name)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Replayed(_Found, ReplayResult):
     """The estimator over a recording."""
 
@@ -258,7 +258,7 @@ class Replayed(_Found, ReplayResult):
         result_files.write_replay(self, files)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Simulated(_Found, Simulation):
     """A simulated recording and its truth."""
 

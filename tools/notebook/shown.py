@@ -5,19 +5,23 @@ from __future__ import annotations
 
 import importlib
 from abc import ABC, abstractmethod
+from collections.abc import Sequence
 from html import escape
+from itertools import accumulate
 from pathlib import Path
 from typing import Any
 
 from jointscope.robots.errors import JointscopeError
 from jointscope.tools.notebook.made_from import recorded_files, robot_files
 from jointscope.tools.presentation.numbers import significant
+from jointscope.tools.terminal.text_table import text_table
 from jointscope.tools.verb_parts.result_files import ResultFiles
 from jointscope.tools.writing.protected_files import check_robot_files
 from jointscope.tools.writing.whole_file import check_outputs
 
 Row = dict[str, Any]
-SHOWN_ROWS = 40  # in a notebook; the data frame has all
+SHOWN_ROWS = 40  # in a notebook or on a screen; the data frame has all
+SHOWN_WIDTH = 160  # characters of a printed line
 
 
 class Shown(ABC):
@@ -104,10 +108,32 @@ class Shown(ABC):
         told = f"<b>{first}</b>{''.join(f'<br>{doubt}' for doubt in doubts)}"
         return f"<p>{told}</p><table><tr>{head}</tr>{lines}</table>{more}"
 
+    def __repr__(self) -> str:
+        """What `print` and an interactive Python show: the answer, and a table of the numbers."""
+        return f"{self.answer()}\n\n{_plain_table(self.rows())}".rstrip()
+
+
+def _text(value: Any) -> str:
+    return significant(value, 5) if isinstance(value, float) else "" if value is None else str(value)
+
 
 def _cell(value: Any) -> str:
-    text = significant(value, 5) if isinstance(value, float) else "" if value is None else str(value)
-    return f"<td>{escape(text)}</td>"
+    return f"<td>{escape(_text(value))}</td>"
+
+
+def _plain_table(rows: Sequence[Row]) -> str:
+    """The first rows, with the columns that a screen has room for, and a line that says what is left."""
+    if not rows:
+        return ""
+    shown = rows[:SHOWN_ROWS]
+    cells = {name: [_text(row[name]) for row in shown] for name in rows[0]}
+    ends = accumulate(2 + max(map(len, (name, *texts))) for name, texts in cells.items())
+    names = [name for k, (name, end) in enumerate(zip(cells, ends, strict=True)) if end <= SHOWN_WIDTH or k == 0]
+    align = "".join(">" if any(isinstance(row[name], float) for row in shown) else "<" for name in names)
+    table = text_table(names, list(zip(*(cells[name] for name in names), strict=True)), align)
+    left = [(len(rows) - len(shown), "rows"), (len(cells) - len(names), "columns")]
+    more = " and ".join(f"{count} more {what}" for count, what in left if count)
+    return f"{table}\n  ({more}: rows(), to_dataframe())" if more else table
 
 
 def _outside(module: str, method: str, way: str) -> Any:

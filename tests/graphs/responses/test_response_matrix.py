@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from periodic_systems import RATE, N, recorded, true_response, two_by_two
+from ringing_masses import ringing
 
 from jointscope.graphs.responses.distortions import distortions
 from jointscope.graphs.responses.find_excitation import find_excitation
@@ -120,11 +121,18 @@ def test_experiments_without_a_gap_between_them_are_told_apart():
     found = find_excitation(signals.inputs, 2, "made")
     assert [(e.realisation, e.number) for e in found.experiments] == [(0, 0), (0, 1), (1, 0), (1, 1)]
     np.testing.assert_allclose(
-        response_matrix(spectra(signals, found)).G,
-        response_matrix(spectra(signals, excitation)).G,
-        rtol=0.02,
-        atol=1e-6,
+        [e.start for e in found.experiments], [e.start for e in excitation.experiments], atol=1e-9
     )
+    np.testing.assert_allclose(
+        response_matrix(spectra(signals, found)).G, response_matrix(spectra(signals, excitation)).G, rtol=1e-9
+    )
+
+
+def test_no_sample_of_the_next_experiment_counts_where_a_period_is_no_multiple_of_the_windows():
+    signals = ringing(np.arange(1, 200, 2), realisations=3, periods=4, every=2)
+    found = find_excitation(signals.inputs, 1, "made")
+    assert [e.start for e in found.experiments] == pytest.approx([0.0, 8.0, 16.0])
+    assert [e.periods for e in found.experiments] == [4, 4, 4]
 
 
 def test_clocks_of_their_own_do_not_turn_the_phase():

@@ -20,6 +20,9 @@ CONTENT = {
         "joint2.stiffness": {"value": 120.0, "sigma": 6.0, "unit": "N m/rad"},
         "joint3.stiffness": {"value": 100.0, "sigma": None, "unit": "N m/rad"},
         "imu1.bias": {"value": [0.1, 0.2, 0.3], "sigma": [0.1, 0.1, 0.1], "unit": "rad/s"},
+        "imu1.R_imu_body": {"value": [[1.0, 0.0, 0.0]] * 3, "sigma": [0.001, 0.001, 0.1], "unit": "1; sigma ..."},
+        "imu2.bias": {"value": [0.1, 0.2, 0.3], "sigma": None, "unit": "rad/s"},
+        "joint4.damping": {"value": 5.0, "sigma": math.nan, "unit": "N m s/rad"},
         "joint1.torque_offset.torque": {"value": 0.0, "sigma": 0.1, "unit": "N m"},
     },
     "channels": {
@@ -53,6 +56,14 @@ def outcome(folder: Path, line: str, content=CONTENT) -> tuple[str, str]:
         ("parameter: joint2.stiffness, sigma_percent: 4.9", FAIL),
         ("parameter: joint3.stiffness, at_most: 1000 N m/rad", OPEN),  # held, not calibrated
         ("parameter: imu1.bias, at_most: 1", OPEN),  # no single number
+        ("parameter: imu1.bias.y, between: [-0.1, 0.5 rad/s]", PASS),
+        ("parameter: imu1.bias.y, sigma: 5 deg/s", FAIL),
+        ("parameter: imu1.R_imu_body.z, sigma: 6 deg", PASS),
+        ("parameter: imu1.R_imu_body.z, sigma: 5 deg", FAIL),
+        ("parameter: imu1.R_imu_body.z, at_most: 1 rad", OPEN),  # an angle of nothing
+        ("parameter: imu1.R_imu_body.z, sigma: 1 m", OPEN),
+        ("parameter: imu2.bias.x, sigma: 1 rad/s", OPEN),  # held
+        ("parameter: joint4.damping, at_most: 9 N m s/rad", OPEN),  # a sigma that is no number
         ("parameter: joint1.torque_offset.torque, sigma_percent: 5", OPEN),  # of zero
         ("parameter: joint4.stiffness, at_most: 1", OPEN),
         ("channel: joint1.motor_position, rmse: 0.2 mrad", PASS),
@@ -81,7 +92,19 @@ def test_outcomes(tmp_path, line, expected):
 )
 def test_an_error_that_is_not_there_is_named_with_its_horizon(tmp_path, horizon, words):
     line = f"channel: joint1.motor_position, horizon: {horizon}, error: 20 mrad/s"
-    assert outcome(tmp_path, line) == (OPEN, f"this result has {words}`jointscope compare` has it")
+    assert outcome(tmp_path, line) == (
+        OPEN,
+        f"this result has {words}`jointscope compare` has 0.01, 0.1, 1.0, open_loop",
+    )
+
+
+def test_of_what_is_no_single_number_the_names_of_the_screen_are_told_and_found(tmp_path):
+    told = outcome(tmp_path, "parameter: imu1.bias, sigma: 1 rad/s")
+    assert told == (OPEN, "it is no single number: name one of imu1.bias.x, imu1.bias.y, imu1.bias.z")
+    assert outcome(tmp_path, "parameter: imu2.bias.x, sigma: 1 rad/s") == (OPEN, "it was held, not calibrated")
+    lines = check_limits(limits_of(tmp_path, 'parameter: "imu1.*", sigma: 0.11 rad, because: bench'), CONTENT)
+    assert [line.name for line in lines if line.outcome == PASS] == [f"imu1.R_imu_body.{axis}" for axis in "xyz"]
+    assert [line.name for line in lines if line.outcome == OPEN] == [f"imu1.bias.{axis}" for axis in "xyz"]
 
 
 def test_a_pattern_is_checked_on_every_name_that_fits(tmp_path):

@@ -39,6 +39,7 @@ def test_a_result_of_a_calibration_is_exported_with_its_robot(tmp_path):
     assert 'friction="7.25"' in (tmp_path / "found.urdf").read_text()
     assert set(done.models) == {"urdf"}
     assert "found.urdf" in done._repr_html_()
+    assert str(done) == repr(done) == done.answer()
 
 
 def test_what_was_added_can_be_removed():

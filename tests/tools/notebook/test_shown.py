@@ -23,7 +23,7 @@ from jointscope.robots.errors import JointscopeError, RobotError
 from jointscope.tools.acceptance.evaluation import check_models
 from jointscope.tools.notebook.given import limits_of
 from jointscope.tools.notebook.results import Calibrated, Compared, Diagnosed, Discovered
-from jointscope.tools.notebook.shown import SHOWN_ROWS
+from jointscope.tools.notebook.shown import SHOWN_ROWS, SHOWN_WIDTH
 from jointscope.tools.terminal.calibration_text import calibration_text
 
 
@@ -62,6 +62,33 @@ def test_a_notebook_shows_the_answer_and_a_table_whose_texts_are_escaped(results
         assert shown.startswith("<p><b>") and result.answer().split(",")[0][:20] in shown
         assert shown.count("<tr>") == 1 + min(len(result.rows()), SHOWN_ROWS)
         assert "<train" not in shown
+
+
+def test_print_shows_the_answer_and_a_plain_table_that_fits_a_screen(results):
+    for result in results:
+        printed = str(result)
+        assert printed == repr(result) and printed.startswith(result.answer())
+        first = next(iter(result.rows()[0].values()))
+        assert str(first) in printed.removeprefix(result.answer())
+        assert all(len(line) <= SHOWN_WIDTH for line in printed.removeprefix(result.answer()).splitlines())
+        assert len(printed) < 12_000
+
+
+def test_a_printed_table_has_the_values_and_says_what_is_left(calibrated):
+    stiffness = calibrated["joint2.stiffness"]
+    (line,) = (line for line in str(calibrated).splitlines() if line.startswith("  joint2.stiffness "))
+    assert float(line.split()[1]) == pytest.approx(stiffness.value, rel=1e-4)
+    assert "N m/rad" in line
+    many = dataclasses.replace(calibrated, parameters=calibrated.parameters[:1] * 50, derived=())
+    assert str(many).splitlines()[-1] == "  (10 more rows: rows(), to_dataframe())"
+
+
+def test_a_recording_and_what_is_in_a_bag_print_in_words(simulated, tmp_path):
+    printed = str(dataclasses.replace(simulated.recording, path="it.mcap"))
+    assert printed.startswith("it.mcap: ") and "command (2000 samples, 3 channels)" in printed and "\n" not in printed
+    js.simulate("doggy", tmp_path / "it.mcap", seconds=1.0, seed=1)
+    described = js.info(tmp_path / "it.mcap", "doggy")
+    assert str(described) == described.text()
 
 
 def test_an_answer_holds_the_reasons_and_a_title_only_the_verdict(calibrated, tmp_path):
@@ -227,6 +254,7 @@ def test_limits_are_shown_and_saved_with_the_result(lines, outcome, said, tmp_pa
     result = limited(fake_calibration(), tmp_path, *lines)
     assert result.accepted == outcome
     assert said in result._repr_html_()
+    assert said in str(result) and f"  {outcome}  " in str(result)
     result.save(report=tmp_path / "r.html", json=tmp_path / "r.json")
     assert said in (tmp_path / "r.html").read_text()
     assert outcome in {line["outcome"] for line in json.loads((tmp_path / "r.json").read_text())["acceptance"]["doggy"]}

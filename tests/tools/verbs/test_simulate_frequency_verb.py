@@ -112,6 +112,8 @@ def test_a_file_says_what_goes_in_and_out_and_that_commands_are_held(tmp_path, c
     folder = tmp_path / "doggy"
     options = ["--f0", "2", "--highest", "40", "--realisations", "1", "--periods", "3", "--seed", "3"]
     assert main(["simulate", "doggy", "--kind", "frequency", "-o", str(folder), *options]) == 0
+    values = f"jointscope calibrate doggy {folder / 'frequency_1.mcap'} -o doggy_calibrated.yaml\n"
+    assert values in capsys.readouterr().out  # with all that the verb needs
     told = yaml.safe_load((folder / "excitation.yaml").read_text())
     assert told["inputs"] == "/motor_command:effort:joint1,joint2,joint3" and told["held"] is True
     assert told["outputs"] == "/joint_states:position:joint1,joint2,joint3"

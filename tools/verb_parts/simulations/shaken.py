@@ -122,8 +122,8 @@ def _of_motion(robot: Robot, args: argparse.Namespace, shaking: Any) -> Written:
     bags = write_described(args.output, robot, recordings, excitation, said)
     hint = (
         f"\n  responses: jointscope frequency {' '.join(map(str, bags))} --report frf.html"
-        f"\n  its values: jointscope calibrate {args.robot} {bags[0]}, as motion; --frequency needs a section "
-        "`frequency` in the robot file, and torques that were measured"
+        f"\n  its values: jointscope calibrate {args.robot} {bags[0]} -o {Path(args.robot).stem}_calibrated.yaml"
+        "\n  (as motion; --frequency needs a section `frequency` in the robot file, and torques that were measured)"
     )
     return bags, len(multisine.lines), truth, hint
 
