@@ -75,6 +75,7 @@ def response_matrix(found: Spectra) -> ResponseMatrix:
     G = each.mean(axis=0)
     noise = None if found.periods < 2 else _noise(found, G, inverses)
     R = len(each)
+    again = len({e.realisation for e in found.excitation.experiments}) - len(np.unique(found.realisations))
     sizes = _sizes(inverses, len(found.outputs))
     if R > 1:
         miss = (each - G).reshape(R, len(lines), -1)
@@ -87,6 +88,8 @@ def response_matrix(found: Spectra) -> ResponseMatrix:
     else:
         total = _about_neighbours(G, sizes)
         text = "the scatter of neighbouring lines, as there is one realisation; record others with other random phases"
+    if again:
+        text += f" ({again} said to be others have the same phases, which show noise alone)"
     return ResponseMatrix(
         found.excitation.frequencies, G, noise, total, each, found.inputs, found.outputs, found.periods, text
     )

@@ -210,3 +210,58 @@ def test_a_lost_sample_is_said_with_its_place(linear):
     gone = Signal(np.delete(signals.inputs.times, 700), np.delete(signals.inputs.values, 700, axis=0), ("c0", "c1"))
     with pytest.raises(RecordingError, match=r"samples near .* beside an even grid of 5 ms"):
         spectra(replace(signals, inputs=gone), excitation)
+
+
+@pytest.mark.parametrize("ppm", [0.0, 40.0])
+def test_stamps_that_jitter_and_clocks_that_run_too_fast_are_no_lost_samples(linear, ppm):
+    signals, excitation = linear
+    rng = np.random.default_rng(4)
+
+    def stamped(signal):
+        late = 0.005 * rng.standard_normal(len(signal.times)) / RATE
+        late[::501] += 0.8 / RATE  # single ones come nearly a step late
+        return replace(signal, times=signal.times * (1.0 + 1e-6 * ppm) + late)
+
+    jittered = replace(signals, inputs=stamped(signals.inputs), outputs=stamped(signals.outputs))
+    matrix = response_matrix(spectra(jittered, excitation))
+    assert jittered.inputs.step * RATE - 1.0 == pytest.approx(1e-6 * ppm, abs=1e-6)
+    ratio = np.abs(matrix.G - true_response(matrix.frequencies)) / matrix.sigmas(matrix.total)
+    assert 0.8 < np.sqrt(np.mean(ratio**2)) < 1.25
+
+
+def test_the_same_phases_again_are_no_other_realisation():
+    """Their scatter is noise; what a nonlinear system makes of these phases comes again."""
+    gain = 1.0 + 0.75 * 0.02 * (2 * len(ODD) - 1)
+    signals, excitation = recorded(cubic, ODD, 1, realisations=1, sigma=1e-3)
+    (once,) = excitation.experiments
+    t = signals.inputs.times
+    later = np.concatenate([t, t + 100.0])
+    twice = replace(
+        signals,
+        inputs=replace(signals.inputs, times=later, values=np.tile(signals.inputs.values, (2, 1))),
+        outputs=replace(signals.outputs, times=later, values=np.tile(signals.outputs.values, (2, 1))),
+    )
+    again = replace(once, realisation=1, start=once.start + 100.0)
+    for second in (again, replace(again, start=again.start + 37 / RATE, periods=once.periods - 1)):
+        matrix = response_matrix(spectra(twice, replace(excitation, experiments=(once, second))))
+        assert matrix.total_from.endswith("(1 said to be others have the same phases, which show noise alone)")
+        ratio = np.abs(matrix.G - gain) / matrix.sigmas(matrix.total)
+        assert 0.5 < np.sqrt(np.mean(ratio**2)) < 1.7
+
+
+def test_experiments_that_are_no_pair_are_refused():
+    signals, excitation = recorded(two_by_two, ODD, 2, realisations=2, pairs=True)
+    a, b, c, d, *rest = excitation.experiments
+    swapped = replace(a, start=c.start), b, replace(c, start=a.start), d, *rest
+    with pytest.raises(RecordingError, match="two signs of realisation 0, experiment 0 are no pair: their inputs"):
+        spectra(signals, replace(excitation, experiments=swapped))
+
+
+def test_signals_of_few_levels_and_commands_that_stay_are_not_clipped():
+    signals, excitation = recorded(lambda u: u, LINES, 1, realisations=2, sigma=1e-3)
+    stays = np.repeat(signals.inputs.values[::8], 8, axis=0)
+    low = replace(excitation, lines=LINES[LINES < 20])
+    for values, lines in ((stays, low), (np.sign(signals.inputs.values), excitation)):
+        spectra(edited(signals, values=values), lines)
+    with pytest.raises(RecordingError, match="it is clipped"):
+        spectra(edited(signals, values=np.clip(stays, -8.0, 8.0)), low)
