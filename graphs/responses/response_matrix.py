@@ -15,6 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from jointscope.graphs.responses.buried_inputs import BURIED, noise_answers
 from jointscope.graphs.responses.neighbouring_lines import (
     NEIGHBOURS,
     response_sizes,
@@ -44,6 +45,7 @@ class ResponseMatrix:
         inputs, outputs: names.
         periods: of each experiment.
         total_from: what the total covariance comes from, in words.
+        buried: where an input hardly rises above its noise, shape (l, nu); None with one period.
     """
 
     frequencies: Array
@@ -55,6 +57,7 @@ class ResponseMatrix:
     outputs: tuple[str, ...]
     periods: int
     total_from: str
+    buried: NDArray[np.bool_] | None = None
 
     def sigmas(self, covariance: Complex) -> Array:
         """Of the entries: root of the mean square distance in the complex plane, shape (l, ny, nu)."""
@@ -92,10 +95,15 @@ def response_matrix(found: Spectra) -> ResponseMatrix:
     else:
         total = _about_neighbours(G, _inputs(inverses))
         text = "the scatter of neighbouring lines, as there is one realisation; record others with other random phases"
+    buried = None
+    if found.periods > 1:
+        share, moved = noise_answers(found, G, inverses)
+        buried, moved = share > BURIED, moved.reshape(len(lines), -1)
+        total = total + moved[:, :, None] * moved[:, None, :].conj()
     if again:
         text += f" ({again} said to be others have the same phases, which show noise alone)"
     return ResponseMatrix(
-        found.excitation.frequencies, G, noise, total, each, found.inputs, found.outputs, found.periods, text
+        found.excitation.frequencies, G, noise, total, each, found.inputs, found.outputs, found.periods, text, buried
     )
 
 
