@@ -18,7 +18,7 @@ from jointscope.factors.calibration import DYNAMICS, Calibration
 from jointscope.graphs.frequency.explained import PoseFit, pose_fit
 from jointscope.graphs.frequency.shaken_pose import ShakenPose
 from jointscope.graphs.frequency.stages import first_stage, next_stage
-from jointscope.graphs.responses.response_matrix import NEIGHBOURS
+from jointscope.graphs.responses.neighbouring_lines import NEIGHBOURS
 from jointscope.robots.model.robot import Robot
 from jointscope.robots.recordings.signals import Excitation, Signals
 

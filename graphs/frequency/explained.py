@@ -23,7 +23,7 @@ from jointscope.factors.calibration import DYNAMICS, Calibration
 from jointscope.graphs.frequency.agreement import Agreement, agreement
 from jointscope.graphs.frequency.frequency_set import FrequencySet
 from jointscope.graphs.frequency.frequency_summary import FrequencySummary
-from jointscope.graphs.responses.response_matrix import over_neighbours
+from jointscope.graphs.responses.neighbouring_lines import over_neighbours
 from jointscope.robots.files.frequency_section import COULOMB
 from jointscope.robots.model.robot import Robot
 

@@ -16,7 +16,7 @@ from jointscope.factors.calibration import DYNAMICS, Calibration
 from jointscope.graphs.frequency.frequency_set import FrequencySet
 from jointscope.graphs.frequency.rattling import dwellings
 from jointscope.graphs.frequency.stages import next_stage
-from jointscope.graphs.responses.response_matrix import NEIGHBOURS
+from jointscope.graphs.responses.neighbouring_lines import NEIGHBOURS
 from jointscope.graphs.solving.batch_solver import Progress, Solution, solve
 from jointscope.graphs.solving.estimate import Estimate
 from jointscope.graphs.solving.posterior import posteriors

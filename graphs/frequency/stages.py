@@ -20,7 +20,7 @@ from jointscope.graphs.frequency.motor_effects import MotorEffects, measured_tor
 from jointscope.graphs.frequency.motor_stiffness import MotorStiffness, motor_stiffness
 from jointscope.graphs.frequency.moving_arm import moving_arm
 from jointscope.graphs.frequency.shaken_pose import ShakenPose
-from jointscope.graphs.responses.response_matrix import NEIGHBOURS, neighbours, over_neighbours
+from jointscope.graphs.responses.neighbouring_lines import NEIGHBOURS, neighbours, over_neighbours
 from jointscope.robots.bodies.misplaced_joints import ANGLES, LENGTHS
 from jointscope.robots.geometry.error_parameters import CUBIC, LINK_INERTIA, LINK_MASS, PAYLOAD
 from jointscope.robots.geometry.flexible_arm import FlexibleArm

@@ -6,6 +6,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
+import numpy as np
+from numpy.typing import NDArray
+
 from jointscope.graphs.responses.distortions import Distortions, distortions
 from jointscope.graphs.responses.local_polynomials import response_without_periods
 from jointscope.graphs.responses.resonances import Resonance, resonances
@@ -50,6 +53,9 @@ class MeasuredResponse:
         odd = None if excitation is None else distortions(found, matrix)
         return MeasuredResponse(found, matrix, odd, tuple(peaks))
 
+    def _at(self, lines: NDArray[np.bool_]) -> list[float]:
+        return list(map(float, self.matrix.frequencies[lines]))
+
     def to_json(self) -> dict[str, Any]:
         """The content of `--json`."""
         m = self.matrix
@@ -71,6 +77,7 @@ class MeasuredResponse:
             "noise": noise,
             "total": m.relative(m.total).tolist(),
             "total_from": m.total_from,
+            "buried": None if m.buried is None else dict(zip(m.inputs, map(self._at, m.buried.T), strict=True)),
             "resonances": [
                 {
                     "input": m.inputs[r.input],

@@ -5,8 +5,9 @@ About each peak and each dip of its size a fraction of two polynomials of degree
 G = (b0 + b1 s + b2 s^2) / (a0 + a1 s + s^2), weighted with the total covariance; poles are those of the peak, zeros
 those of the dip. Where lines ask for more, one polynomial has degree four. A root s has the frequency |s| and the
 damping -Re s / |s|. The fraction may be late by about a sample, as where an input that is held until the next one is
-taken for a measured one: half a sample had made the damping of a dip 13 % too large, 3.8 of its sigmas. A noisy line is
-no resonance: without its roots lines must fit worse.
+taken for a measured one: half a sample had made the damping of a dip 13 % too large, 3.8 of its sigmas. It may be
+smaller at higher lines, too, as much as held inputs are. A noisy line is no resonance: without its roots lines must fit
+worse.
 """
 
 from __future__ import annotations
@@ -114,7 +115,8 @@ def _fitted(entry: _Entry, peak: int, anti: bool) -> tuple[float, float, float, 
     scale = float(np.abs(entry.G[near]).mean())
     g, weight = entry.G[near] / scale, scale / np.maximum(entry.sigma[near], 1e-12 * scale)
     s = np.asarray(1j * f[near] / middle, dtype=np.complex128)
-    lines = _Lines(s, g, weight, 2.0 * np.pi * middle * LATE * entry.step)
+    turn = 2.0 * np.pi * middle * entry.step
+    lines = _Lines(s, g, weight, turn * LATE, turn**2 / 24.0 * (np.abs(s) ** 2 - 1.0))
     degrees = [(2, 2), (2, WIDER), (WIDER, 2)] if 2 * len(near) >= FEWEST_PER_VALUE * (WIDER + 3) else [(2, 2)]
     fit = lines.best(degrees)
     without = lines.best([(0, 2) if anti else (2, 0), (1, 1)])
@@ -137,12 +139,16 @@ class _Fraction:
 
 @dataclass(frozen=True)
 class _Lines:
-    """Lines about a peak, shape (m,) each: s over its frequency, response and weights; how late it may be [rad]."""
+    """Lines about a peak, shape (m,) each: s over its frequency, response and weights; how late it may be [rad].
+
+    Held inputs are smaller by sin(x) / x, x being pi times frequency and step: `smaller` by that than at the peak.
+    """
 
     s: Complex
     g: Complex
     weight: Array
     late: float
+    smaller: Array
 
     def best(self, degrees: Sequence[tuple[int, int]]) -> _Fraction | None:
         """The fraction that fits best among some, each value worth the logarithm of the number of equations."""
@@ -158,22 +164,22 @@ class _Lines:
         n = above + 1
 
         def residual(x: Array) -> Array:
-            late = np.exp(-self.s * x[-1] * self.late)
-            g = late * (powers[:, :n] @ x[:n]) / (powers[:, : below + 1] @ np.append(x[n:-1], 1.0))
+            held = np.exp(-self.s * x[-2] * self.late) * (1.0 - x[-1] * self.smaller)
+            g = held * (powers[:, :n] @ x[:n]) / (powers[:, : below + 1] @ np.append(x[n:-2], 1.0))
             r = self.weight * (g - self.g) * np.sqrt(2.0)
-            return np.concatenate([r.real, r.imag, x[-1:]])
+            return np.concatenate([r.real, r.imag, x[-2:]])
 
-        start = np.append(_linear_start(powers, self.g, self.weight, n, below), 0.0)
+        start = np.append(_linear_start(powers, self.g, self.weight, n, below), [0.0, 0.0])
         x_scale = np.maximum(np.abs(start), 1e-3 * np.abs(start).max())
-        x_scale[-1] = 1.0
+        x_scale[-2:] = 1.0
         fit = least_squares(residual, start, x_scale=x_scale, max_nfev=200)
         chi2 = 2.0 * fit.cost
         misfit = chi2 / max(len(fit.fun) - len(start), 1)
         try:
-            covariance = np.linalg.inv(fit.jac.T @ fit.jac)[:-1, :-1] * max(misfit, 1.0)
+            covariance = np.linalg.inv(fit.jac.T @ fit.jac)[:-2, :-2] * max(misfit, 1.0)
         except np.linalg.LinAlgError:
             return None
-        return _Fraction(above, fit.x[:-1], covariance, chi2, misfit)
+        return _Fraction(above, fit.x[:-2], covariance, chi2, misfit)
 
 
 def _linear_start(powers: Complex, g: Complex, weight: Array, n: int, below: int) -> Array:

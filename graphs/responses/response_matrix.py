@@ -15,12 +15,18 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from jointscope.graphs.responses.buried_inputs import BURIED, noise_answers
+from jointscope.graphs.responses.neighbouring_lines import (
+    NEIGHBOURS,
+    response_sizes,
+    squares_at,
+    squares_of_neighbours,
+)
 from jointscope.graphs.responses.spectra import Spectra
 from jointscope.robots.errors import RecordingError
 
 Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
-NEIGHBOURS = 4  # lines on each side that are taken together where realisations are few
 MANY = 8  # realisations that tell the covariance of a line without its neighbours
 WORST_CONDITION = 1e3  # of the inputs of a block
 
@@ -39,6 +45,7 @@ class ResponseMatrix:
         inputs, outputs: names.
         periods: of each experiment.
         total_from: what the total covariance comes from, in words.
+        buried: where an input hardly rises above its noise, shape (l, nu); None with one period.
     """
 
     frequencies: Array
@@ -50,6 +57,7 @@ class ResponseMatrix:
     outputs: tuple[str, ...]
     periods: int
     total_from: str
+    buried: NDArray[np.bool_] | None = None
 
     def sigmas(self, covariance: Complex) -> Array:
         """Of the entries: root of the mean square distance in the complex plane, shape (l, ny, nu)."""
@@ -75,30 +83,37 @@ def response_matrix(found: Spectra) -> ResponseMatrix:
     G = each.mean(axis=0)
     noise = None if found.periods < 2 else _noise(found, G, inverses)
     R = len(each)
-    sizes = _sizes(inverses, len(found.outputs))
+    again = len({e.realisation for e in found.excitation.experiments}) - len(np.unique(found.realisations))
     if R > 1:
-        miss = (each - G).reshape(R, len(lines), -1)
+        miss = each - G
         if R < MANY:
-            miss = miss / sizes
-        total = np.einsum("rla,rlb->lab", miss, miss.conj()) / ((R - 1) * R)
-        if R < MANY:
-            total = over_neighbours(total) * sizes[:, :, None] * sizes[:, None, :]
+            total = squares_of_neighbours(miss, G, _inputs(inverses)) / ((R - 1) * R)
+        else:
+            miss = miss.reshape(R, len(lines), -1)
+            total = np.einsum("rla,rlb->lab", miss, miss.conj()) / ((R - 1) * R)
         text = f"the scatter of {R} realisations" + (f", {2 * NEIGHBOURS + 1} lines together" if R < MANY else "")
     else:
-        total = _about_neighbours(G, sizes)
+        total = _about_neighbours(G, _inputs(inverses))
         text = "the scatter of neighbouring lines, as there is one realisation; record others with other random phases"
+    buried = None
+    if found.periods > 1:
+        share, moved = noise_answers(found, G, inverses)
+        buried, moved = share > BURIED, moved.reshape(len(lines), -1)
+        total = total + moved[:, :, None] * moved[:, None, :].conj()
+    if again:
+        text += f" ({again} said to be others have the same phases, which show noise alone)"
     return ResponseMatrix(
-        found.excitation.frequencies, G, noise, total, each, found.inputs, found.outputs, found.periods, text
+        found.excitation.frequencies, G, noise, total, each, found.inputs, found.outputs, found.periods, text, buried
     )
 
 
-def _sizes(inverses: list[Complex], ny: int) -> Array:
-    """How far each entry moves with what is left of an output, shape (l, ny nu).
+def _inputs(inverses: list[Complex]) -> Array:
+    """How large inputs are, what is left of an output over how far its entries move with it, shape (l, nu).
 
-    What is left changes little from line to line, inputs may: a controller takes most of a slow excitation away.
+    A controller takes most of a slow excitation away.
     """
-    by_input = np.sqrt(np.mean([np.sum(np.abs(inverse) ** 2, axis=1) for inverse in inverses], axis=0))
-    return np.asarray(np.tile(by_input, (1, ny)))
+    moves = np.mean([np.sum(np.abs(inverse) ** 2, axis=1) for inverse in inverses], axis=0)
+    return np.asarray(1.0 / np.sqrt(np.maximum(moves, 1e-300)))
 
 
 def _check_blocks(found: Spectra, U: Complex) -> None:
@@ -125,56 +140,36 @@ def _noise(found: Spectra, G: Complex, inverses: list[Complex]) -> Complex:
     lines, P, R = found.excitation.lines, found.periods, len(inverses)
     E = found.Y[:, :, lines] - np.einsum("lij,eplj->epli", G, found.U[:, :, lines])
     E = E - E.mean(axis=1, keepdims=True)
-    ny, nu = G.shape[1:]
-    total = np.zeros((len(lines), ny * nu, ny * nu), dtype=complex)
-    for block, inverse in zip(found.blocks, inverses, strict=True):
-        by_output = np.einsum("epli,eplj->elij", E[block], E[block].conj()) / ((P - 1) * P)
-        part = np.einsum("elij,lea,leb->liajb", by_output, inverse, inverse.conj())
-        total += part.reshape(total.shape) / R**2
-    sizes = _sizes(inverses, ny)
-    across = sizes[:, :, None] * sizes[:, None, :]
-    return np.asarray(over_neighbours(np.asarray(total / across, dtype=complex)) * across)
+    left = [
+        np.einsum("epli,lea->eplia", E[block], inverse).reshape(-1, *G.shape)
+        for block, inverse in zip(found.blocks, inverses, strict=True)
+    ]
+    return squares_of_neighbours(np.concatenate(left), G, _inputs(inverses)) / ((P - 1) * P * R**2)
 
 
-def over_neighbours(covariance: Complex, each_side: int = NEIGHBOURS) -> Complex:
-    """Mean of each line, shape (l, ...), and its neighbours on each side, fewer at the ends."""
-    sums = np.concatenate([np.zeros_like(covariance[:1]), np.cumsum(covariance, axis=0)])
-    low, high = _window(len(covariance), each_side)
-    return np.asarray((sums[high] - sums[low]) / (high - low)[:, None, None])
-
-
-def neighbours(lines: int, each_side: int = NEIGHBOURS) -> Array:
-    """How many lines `over_neighbours` takes together, shape (l,)."""
-    low, high = _window(lines, each_side)
-    return np.asarray(high - low, dtype=np.float64)
-
-
-def _window(lines: int, each_side: int) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
-    return np.maximum(np.arange(lines) - each_side, 0), np.minimum(np.arange(lines) + each_side + 1, lines)
-
-
-def _about_neighbours(G: Complex, sizes: Array) -> Complex:
+def _about_neighbours(G: Complex, inputs: Array) -> Complex:
     """Covariance of G by its scatter about fractions (b0 + b1 d + b2 d^2) / (1 + a d) through neighbouring lines d.
 
     A fraction follows a resonance between two lines, which a polynomial does not (local rational method, McKelvey and
-    Guerin, 2012). What is left of an entry is as large as its `sizes`, shape (l, ny nu), say.
+    Guerin, 2012). `inputs` are as large as they say, shape (l, nu).
     """
     n, width = len(G), 2 * NEIGHBOURS + 1
     if n < width:
         raise RecordingError(
             f"{n} lines and one realisation do not determine a covariance; record another realisation of the phases"
         )
-    flat = G.reshape(n, -1)
-    found = np.zeros((n, flat.shape[1], flat.shape[1]), dtype=complex)
+    found = np.zeros((n, G[0].size, G[0].size), dtype=complex)
     d = np.arange(-NEIGHBOURS, NEIGHBOURS + 1) / NEIGHBOURS
     powers = np.vander(d, 3).astype(complex)
     for k in range(n):
         first = min(max(k - NEIGHBOURS, 0), n - width)
-        left = np.empty((width, flat.shape[1]), dtype=complex)
-        near = sizes[first : first + width]
-        for c, g in enumerate(flat[first : first + width].T):
+        own = slice(first, first + width)
+        left = np.empty_like(G[own])
+        for i, a in np.ndindex(*G.shape[1:]):
+            g, weight = G[own, i, a], inputs[own, a]
             A = np.column_stack([powers, -g * d])
-            x = np.linalg.lstsq(A / near[:, c : c + 1], g / near[:, c], rcond=None)[0]
-            left[:, c] = (g - A @ x) / (1.0 + x[3] * d) / near[:, c]
-        found[k] = left.T @ left.conj() / (width - 4) * np.outer(sizes[k], sizes[k])
+            x = np.linalg.lstsq(A * weight[:, None], g * weight, rcond=None)[0]
+            left[:, i, a] = (g - A @ x) / (1.0 + x[3] * d)
+        responses = response_sizes(G[own] - left, inputs[own])
+        found[k] = squares_at(left[None], responses, inputs[own], k - first) * width / (width - 4)
     return found

@@ -22,6 +22,10 @@ Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 Change = Callable[[Array], Array]
 CLIPPED = 2e-3  # share of samples that stay at exactly the largest or smallest value, as no signal within its limits
+LEVELS = 16  # of a signal that switches between so few values: its limits are what was meant
+ALIKE = 0.9  # correlation of the phases at all lines: the same phases
+OPPOSITE = 0.3  # correlation of the phases of a pair, one of them with its sign turned: 1 by right, 0 by chance
+ENOUGH = 9  # lines: the phases of fewer may be alike by chance
 EXCITED = 3.0  # times what is between the lines, or what changes from period to period
 
 
@@ -36,7 +40,8 @@ class Spectra:
         U: of the inputs, shape (e, p, K, nu): experiment, period, line.
         Y: of the outputs, shape (e, p, K, ny).
         common: half the sum of the pairs, of the outputs, shape (e, p, K, ny); None without pairs.
-        realisations: number of each experiment's realisation, shape (e,).
+        realisations: number of each experiment's realisation, shape (e,); one that repeats the phases of another
+            has its number.
     """
 
     path: str
@@ -76,7 +81,9 @@ def spectra(signals: Signals, excitation: Excitation) -> Spectra:
     _check_clipping(signals)
     _check_rates(signals, excitation)
     _check_pairs(signals, excitation)
-    (U, _), (Y, common) = (steady_spectra(s, excitation, signals.path) for s in (signals.inputs, signals.outputs))
+    (U, both), (Y, common) = (steady_spectra(s, excitation, signals.path) for s in (signals.inputs, signals.outputs))
+    if both is not None:
+        _check_opposite(U.mean(axis=1), both.mean(axis=1), excitation, signals.path)
     K = min(U.shape[2], Y.shape[2])
     made = Spectra(
         signals.path,
@@ -86,7 +93,7 @@ def spectra(signals: Signals, excitation: Excitation) -> Spectra:
         U[:, :, :K],
         Y[:, :, :K],
         None if common is None else common[:, :, :K],
-        np.array([key[0] for key in _keys(excitation)], dtype=np.intp),
+        _distinct(np.array([key[0] for key in _keys(excitation)], dtype=np.intp), U.mean(axis=1), excitation),
     )
     _check_excited(made)
     return made
@@ -131,6 +138,33 @@ def _keys(excitation: Excitation) -> list[tuple[int, int]]:
     return sorted({(e.realisation, e.number) for e in excitation.experiments})
 
 
+def _distinct(numbers: NDArray[np.intp], U: Complex, excitation: Excitation) -> NDArray[np.intp]:
+    """Numbers of realisations, shape (e,): the same phases again, shifted in time or not, are no other realisation.
+
+    All that a nonlinear system does comes again with them, so their scatter is noise alone.
+    """
+    lines = excitation.lines
+    if len(lines) < ENOUGH:
+        return numbers
+    U = U[:, lines] / np.maximum(np.linalg.norm(U[:, lines], axis=2, keepdims=True), 1e-300)
+    shifts = 1 if excitation.carrier else 8 * (int(lines.max()) + 1)  # beside a motion the time matters, too
+    merged = numbers.copy()
+    for r in np.unique(numbers):
+        for earlier in np.unique(merged[merged < r]):
+            one, other = U[numbers == r], U[merged == earlier]
+            cross = np.zeros((len(one), len(other), shifts // 2 + 1 if shifts > 1 else len(lines)), dtype=complex)
+            products = np.einsum("alj,blj->abl", one, other.conj())
+            if shifts > 1:
+                cross[:, :, lines] = products
+                alike = np.abs(np.fft.irfft(cross, shifts)).max(axis=2) * shifts / 2.0
+            else:
+                alike = np.abs(products.real.sum(axis=2))
+            if np.all(alike.max(axis=1) > ALIKE * len(lines)):
+                merged[numbers == r] = earlier
+                break
+    return merged
+
+
 def _check_pairs(signals: Signals, excitation: Excitation) -> None:
     signs = {
         key: {e.sign for e in excitation.experiments if (e.realisation, e.number) == key} for key in _keys(excitation)
@@ -141,6 +175,24 @@ def _check_pairs(signals: Signals, excitation: Excitation) -> None:
             f"{signals.path}: experiment {lonely[0][1]} of realisation {lonely[0][0]} has one sign, others have both; "
             "leave it out, or record the other sign"
         )
+
+
+def _check_opposite(U: Complex, both: Complex, excitation: Excitation, path: str) -> None:
+    """Experiments of a pair must differ in the sign of their inputs.
+
+    Raises:
+        RecordingError: they do not.
+    """
+    for (realisation, number), half, rest in zip(_keys(excitation), U, both, strict=True):
+        plus, minus = (rest + sign * half for sign in (1.0, -1.0))
+        plus, minus = plus[excitation.lines], minus[excitation.lines]
+        size = np.linalg.norm(plus, axis=1) * np.linalg.norm(minus, axis=1)
+        alike = -np.sum(plus * minus.conj(), axis=1).real / np.maximum(size, 1e-300)
+        if np.mean(alike) < OPPOSITE:
+            raise RecordingError(
+                f"{path}: the two signs of realisation {realisation}, experiment {number} are no pair: their inputs "
+                f"are not opposite; correct sign, start or number of its experiments in {excitation.source}"
+            )
 
 
 def _check_rates(signals: Signals, excitation: Excitation) -> None:
@@ -155,10 +207,15 @@ def _check_rates(signals: Signals, excitation: Excitation) -> None:
 
 def _check_clipping(signals: Signals) -> None:
     for name, u in zip(signals.inputs.names, signals.inputs.values.T, strict=True):
+        if len(np.unique(u)) <= LEVELS:
+            continue
+        first = np.concatenate([[0], np.flatnonzero(np.diff(u)) + 1])
+        length = np.diff(first, append=len(u))
         for limit in (u.max(), u.min()):
-            at = u == limit
-            share = float(np.mean(at[1:] & at[:-1]))
-            if np.ptp(u) > 0.0 and share > CLIPPED:
+            at = u[first] == limit
+            usual = np.median(length[~at])  # above one where a command comes more rarely than samples
+            share = float(np.sum(np.maximum(length[at] - usual, 0))) / len(u)
+            if share > CLIPPED:
                 raise RecordingError(
                     f"{signals.path}: {name} stands at {limit:.4g} in {100.0 * share:.2g} % of the samples: it is "
                     "clipped, and what is lost comes back at all lines; excite less"

@@ -71,7 +71,8 @@ def read_excitation(path: Path, bag: Path, step: float) -> Excitation:
         RecordingError: it cannot be read, or says nothing of this bag, or has another sampling time.
     """
     with _content(path) as top:
-        f0, lines = top.number("f0", positive=True), np.array(top.raw("lines"), dtype=np.intp)
+        f0, said_lines = top.number("f0", positive=True), np.array(top.raw("lines"), dtype=np.float64)
+        lines = said_lines.astype(np.intp)
         said = top.number("sample_time", step, positive=True)
         listed = top.raw("experiments")
         rows = [Section(row, f"{path}: experiments[{i}]") for i, row in enumerate(listed or [])]
@@ -88,14 +89,21 @@ def read_excitation(path: Path, bag: Path, step: float) -> Excitation:
         raise RecordingError(
             f"{path}: sample_time {said:g} s, but {bag} is sampled every {step:.6g} s; the file belongs to another bag"
         )
-    if not len(lines) or lines.min() < 1:
-        raise RecordingError(f"{path}: lines: expected whole numbers from 1 on, got {lines.tolist()}")
+    if not lines.size or lines.ndim != 1 or lines.min() < 1 or np.any(lines != said_lines):
+        raise RecordingError(f"{path}: lines: expected whole numbers from 1 on, got {said_lines.tolist()}")
     if f0 * lines.max() > 0.5 / step:
         raise RecordingError(
             f"{path}: line {lines.max()} is at {f0 * lines.max():g} Hz, above half the sampling rate of "
             f"{1.0 / step:g} Hz, where it is folded onto another frequency; leave these lines out or record faster"
         )
-    return Excitation(f0, np.sort(lines), own, carrier, str(path))
+    keys = [(e.realisation, e.number, e.sign) for e in own]
+    twice = next((key for i, key in enumerate(keys) if key in keys[:i]), None)
+    if twice is not None:
+        raise RecordingError(
+            f"{path}: realisation {twice[0]}, experiment {twice[1]}, sign {twice[2]} of the bag {bag.stem!r} is listed "
+            "twice; give each experiment a number of its own, and one that comes again another realisation"
+        )
+    return Excitation(f0, np.unique(lines), own, carrier, str(path))
 
 
 def _experiment(row: Section) -> Experiment:

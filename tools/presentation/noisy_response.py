@@ -1,11 +1,12 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What a frequency response that says little likely suffers from: one sentence, as far as the recording shows it."""
+"""What a frequency response that says little likely suffers from: a sentence, as far as the recording shows it."""
 
 from __future__ import annotations
 
 import numpy as np
 
 from jointscope.graphs.responses.measured_response import MeasuredResponse
+from jointscope.robots.recordings.signals import named
 from jointscope.tools.presentation.numbers import percent
 
 NOISY = 0.3  # total sigma over the size of an entry, the median over lines: above it a response tells little
@@ -37,4 +38,21 @@ def noise_doubt(found: MeasuredResponse) -> str:
     return (
         f"{said}: the output changes from period to period. Likely the excitation is small against sensor noise, the "
         "system had not settled, something else moves it, or input and output do not belong together (--from, --to)."
+    )
+
+
+def buried_lines(found: MeasuredResponse) -> str:
+    """At which lines an input is buried in noise; empty where none is."""
+    m = found.matrix
+    if m.buried is None or not np.any(m.buried):
+        return ""
+    parts = [
+        f"{name} at {named([f'{f:g}' for f in m.frequencies[lines]])} Hz"
+        for name, lines in zip(m.inputs, m.buried.T, strict=True)
+        if np.any(lines)
+    ]
+    return (
+        f"Inputs that hardly rise above their noise: {'; '.join(parts)}. The response from them is too small there, "
+        "or in a closed loop the inverse of the controller, by more than sigmas can tell: excite more, leave these "
+        "lines out of the excitation, or name fewer inputs with --from."
     )

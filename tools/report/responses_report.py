@@ -10,6 +10,7 @@ import numpy as np
 
 from jointscope.graphs.responses.distortions import Distortions, Levels
 from jointscope.graphs.responses.measured_response import MeasuredResponse
+from jointscope.tools.presentation.noisy_response import buried_lines
 from jointscope.tools.report.page.page import Key, Section, figure, page, table
 from jointscope.tools.report.page.plot import Axes, Band, Curve, Mark, plot
 from jointscope.tools.terminal.responses_text import RESONANCE_HEAD, entry_rows, resonance_rows
@@ -28,7 +29,7 @@ def _sections(found: MeasuredResponse, suffix: str) -> list[Section]:
     matrix, name = found.matrix, f" ({found.spectra.path})" if suffix else ""
     lead = (
         "Sigma in per cent of each entry, the median over lines. Noise: what changes from period to period. Total: "
-        f"with the distortions, from {matrix.total_from}."
+        f"with the distortions, from {matrix.total_from}. {buried_lines(found)}"
     )
     entries = [[escape(cell) for cell in row] for row in entry_rows(matrix)]
     made = [

@@ -14,7 +14,7 @@ from jointscope.graphs.responses.response_matrix import ResponseMatrix
 from jointscope.robots.recordings.signals import Excitation
 from jointscope.tools.bags.clocks.durations import counted
 from jointscope.tools.presentation.frequency_sentences import matrix_sentence, value_rows
-from jointscope.tools.presentation.noisy_response import noise_doubt
+from jointscope.tools.presentation.noisy_response import buried_lines, noise_doubt
 from jointscope.tools.presentation.numbers import percent, significant, with_sigma
 from jointscope.tools.terminal.text_table import text_table
 from jointscope.tools.verdicts.frequency_judgement import judge_frequency
@@ -46,8 +46,7 @@ def response_text(found: MeasuredResponse) -> str:
         ]
     elif not len(d.even.frequencies) + len(d.odd.frequencies):
         lines += ["", "All lines were excited, so even and odd distortions cannot be told apart."]
-    if doubt := noise_doubt(found):
-        lines += ["", f"! {doubt}"]
+    lines += [part for said in (noise_doubt(found), buried_lines(found)) if said for part in ("", f"! {said}")]
     return "\n".join(lines)
 
 

@@ -60,6 +60,22 @@ def test_commands_that_are_held_and_taken_for_measured_do_not_damp_a_dip(apart):
         assert abs(r.damping - damping) < 3.0 * r.damping_sigma and r.damping_sigma < 0.02 * damping
 
 
+@pytest.mark.parametrize("step", [1e-3, 4e-3])
+def test_held_commands_are_smaller_at_higher_lines_which_small_sigmas_tell_from_damping(step):
+    f = np.arange(0.25, 60.0, 0.5)
+    G = motor_angle_per_torque(f) * (np.sinc(f * step) * np.exp(-1j * np.pi * f * step))[:, None, None]
+    sigma = np.full(G.shape, 1e-11)
+    off = []
+    for seed in range(6):
+        rng = np.random.default_rng(seed)
+        noisy = G + sigma * (rng.normal(size=G.shape) + 1j * rng.normal(size=G.shape)) / np.sqrt(2.0)
+        peak = next(r for r in resonances(f, noisy, sigma, step) if not r.anti)
+        frequency, damping = true_roots()[0]
+        assert peak.damping_sigma < 1e-4 * damping
+        off.append([(peak.frequency - frequency) / peak.frequency_sigma, (peak.damping - damping) / peak.damping_sigma])
+    assert np.all(np.abs(np.mean(off, axis=0)) < 1.3)  # 3 without
+
+
 def test_lines_below_the_noise_are_no_resonances():
     f = np.arange(0.1, 60.0, 0.1)
     G = motor_angle_per_torque(f)

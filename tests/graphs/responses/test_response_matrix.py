@@ -17,7 +17,7 @@ from jointscope.graphs.responses.resonances import resonances
 from jointscope.graphs.responses.response_matrix import response_matrix
 from jointscope.graphs.responses.spectra import spectra
 from jointscope.robots.errors import RecordingError
-from jointscope.robots.recordings.signals import Excitation, Experiment, Signal
+from jointscope.robots.recordings.signals import Excitation, Experiment, Signal, Signals
 
 LINES = np.arange(2, 120)
 ODD = np.array([k for k in range(3, 120, 2) if k % 8 != 7])
@@ -218,3 +218,110 @@ def test_a_lost_sample_is_said_with_its_place(linear):
     gone = Signal(np.delete(signals.inputs.times, 700), np.delete(signals.inputs.values, 700, axis=0), ("c0", "c1"))
     with pytest.raises(RecordingError, match=r"samples near .* beside an even grid of 5 ms"):
         spectra(replace(signals, inputs=gone), excitation)
+
+
+@pytest.mark.parametrize("ppm", [0.0, 40.0])
+def test_stamps_that_jitter_and_clocks_that_run_too_fast_are_no_lost_samples(linear, ppm):
+    signals, excitation = linear
+    rng = np.random.default_rng(4)
+
+    def stamped(signal):
+        late = 0.005 * rng.standard_normal(len(signal.times)) / RATE
+        late[::501] += 0.8 / RATE  # single ones come nearly a step late
+        return replace(signal, times=signal.times * (1.0 + 1e-6 * ppm) + late)
+
+    jittered = replace(signals, inputs=stamped(signals.inputs), outputs=stamped(signals.outputs))
+    matrix = response_matrix(spectra(jittered, excitation))
+    assert jittered.inputs.step * RATE - 1.0 == pytest.approx(1e-6 * ppm, abs=1e-6)
+    ratio = np.abs(matrix.G - true_response(matrix.frequencies)) / matrix.sigmas(matrix.total)
+    assert 0.8 < np.sqrt(np.mean(ratio**2)) < 1.25
+
+
+def test_the_same_phases_again_are_no_other_realisation():
+    """Their scatter is noise; what a nonlinear system makes of these phases comes again."""
+    gain = 1.0 + 0.75 * 0.02 * (2 * len(ODD) - 1)
+    signals, excitation = recorded(cubic, ODD, 1, realisations=1, sigma=1e-3)
+    (once,) = excitation.experiments
+    t = signals.inputs.times
+    later = np.concatenate([t, t + 100.0])
+    twice = replace(
+        signals,
+        inputs=replace(signals.inputs, times=later, values=np.tile(signals.inputs.values, (2, 1))),
+        outputs=replace(signals.outputs, times=later, values=np.tile(signals.outputs.values, (2, 1))),
+    )
+    again = replace(once, realisation=1, start=once.start + 100.0)
+    for second in (again, replace(again, start=again.start + 37 / RATE, periods=once.periods - 1)):
+        matrix = response_matrix(spectra(twice, replace(excitation, experiments=(once, second))))
+        assert matrix.total_from.endswith("(1 said to be others have the same phases, which show noise alone)")
+        ratio = np.abs(matrix.G - gain) / matrix.sigmas(matrix.total)
+        assert 0.5 < np.sqrt(np.mean(ratio**2)) < 1.7
+
+
+def test_experiments_that_are_no_pair_are_refused():
+    signals, excitation = recorded(two_by_two, ODD, 2, realisations=2, pairs=True)
+    a, b, c, d, *rest = excitation.experiments
+    swapped = replace(a, start=c.start), b, replace(c, start=a.start), d, *rest
+    with pytest.raises(RecordingError, match="two signs of realisation 0, experiment 0 are no pair: their inputs"):
+        spectra(signals, replace(excitation, experiments=swapped))
+
+
+def test_signals_of_few_levels_and_commands_that_stay_are_not_clipped():
+    signals, excitation = recorded(lambda u: u, LINES, 1, realisations=2, sigma=1e-3)
+    stays = np.repeat(signals.inputs.values[::8], 8, axis=0)
+    low = replace(excitation, lines=LINES[LINES < 20])
+    for values, lines in ((stays, low), (np.sign(signals.inputs.values), excitation)):
+        spectra(edited(signals, values=values), lines)
+    with pytest.raises(RecordingError, match="it is clipped"):
+        spectra(edited(signals, values=np.clip(stays, -8.0, 8.0)), low)
+
+
+def shaken_mass(seed, noise_in=0.02, noise_out=1e-4, periods=2, realisations=2):
+    """Signals of a mass on a soft servo, f = r - C y, closed in the frequency domain; force and position are noisy."""
+    rng, lines = np.random.default_rng(seed), np.arange(1, 100)
+    s = 2j * np.pi * 0.5 * lines
+    plant, servo = 100.0 / (s**2 + 0.5 * s), ((6.0 * np.pi) ** 2 + 1.4 * 6.0 * np.pi * s) / 100.0
+    experiments, u, y, times = [], [], [], []
+    for r in range(realisations):
+        force, place = np.zeros((2, N // 2 + 1), dtype=complex)
+        force[lines] = N / 2 * np.exp(2j * np.pi * rng.random(len(lines))) / (1.0 + plant * servo)
+        place[lines] = plant * force[lines]
+        for signals, X, sigma in ((u, force, noise_in), (y, place, noise_out)):
+            x = np.tile(np.fft.irfft(X), periods)
+            signals.append(x + sigma * rng.standard_normal(len(x)))
+        start = r * (periods + 0.5) * N / RATE
+        times.append(start + np.arange(periods * N) / RATE)
+        experiments.append(Experiment(r, 0, 1, start, periods))
+    t = np.concatenate(times)
+    made = (Signal(t, np.concatenate(x)[:, None], (name,)) for name, x in (("force", u), ("place", y)))
+    return Signals("made", "", *made), Excitation(0.5, lines, tuple(experiments)), plant
+
+
+def test_sigmas_hold_where_the_response_changes_fast_and_inputs_are_noisy():
+    """Noise of the force is the larger error, the slower a mass is shaken: not as large as at neighbouring lines."""
+    squares = []
+    for seed in range(20):
+        signals, excitation, plant = shaken_mass(seed)
+        matrix = response_matrix(spectra(signals, excitation))
+        for covariance in (matrix.noise, matrix.total):
+            squares.append(np.abs(matrix.G[:, 0, 0] - plant) ** 2 / covariance[:, 0, 0].real)
+    by_line = np.sqrt(np.mean(squares, axis=0))
+    assert by_line[0] < 1.6  # 2.9 by the mean of neighbours
+    assert np.all((by_line[2:6] > 0.6) & (by_line[2:6] < 1.5))  # 0.1 to 0.4
+    assert 0.9 < np.sqrt(np.mean(squares)) < 1.2
+
+
+def test_sigmas_hold_at_a_resonance_that_follows_a_distortion():
+    gain = 1.0 + 0.75 * 0.02 * (2 * len(ODD) - 1)
+    squares = []
+    for seed in range(12):
+        signals, excitation = recorded(cubic, ODD, 1, realisations=3, sigma=1e-3, seed=seed)
+        f = 0.5 * np.arange(N // 2 + 1)
+        resonant = 1.0 / (1.0 - (f / 14.0) ** 2 + 0.03j * f / 14.0)
+        periods = np.fft.rfft(signals.outputs.values.reshape(-1, N), axis=1) * resonant
+        signals = replace(signals, outputs=replace(signals.outputs, values=np.fft.irfft(periods).reshape(-1, 1)))
+        matrix = response_matrix(spectra(signals, excitation))
+        off = matrix.G[:, 0, 0] - gain * resonant[ODD]
+        squares.append(np.abs(off) ** 2 / matrix.total[:, 0, 0].real)
+    peak = int(np.argmax(np.abs(resonant[ODD])))
+    assert np.sqrt(np.mean(squares, axis=0))[peak] < 1.6
+    assert 0.85 < np.sqrt(np.mean(squares)) < 1.2

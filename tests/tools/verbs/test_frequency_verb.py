@@ -130,6 +130,17 @@ def test_an_experiment_that_is_not_in_the_bag_is_refused(tmp_path, capsys):
     assert "the excitation belongs to another recording, or this one was cut off" in capsys.readouterr().err
 
 
+def test_an_experiment_that_is_listed_twice_and_half_a_line_are_refused(tmp_path, capsys):
+    excitation = write(tmp_path)
+    first = excitation.experiments[0]
+    describe(tmp_path, replace(excitation, experiments=(first, *excitation.experiments)))
+    assert main(["frequency", str(tmp_path / "run")]) == 1
+    assert "realisation 0, experiment 0, sign 1 of the bag 'run' is listed twice; give each" in capsys.readouterr().err
+    describe(tmp_path, excitation, lines="[1.5, 3]")
+    assert main(["frequency", str(tmp_path / "run")]) == 1
+    assert "lines: expected whole numbers from 1 on, got [1.5, 3.0]" in capsys.readouterr().err
+
+
 def test_clipped_torques_are_refused(tmp_path, capsys):
     write(tmp_path, u=lambda values: np.clip(values, -6.0, 6.0))
     assert main(["frequency", str(tmp_path / "run")]) == 1
