@@ -8,13 +8,13 @@ are left out by name, and both are repeated until nothing changes.
 from __future__ import annotations
 
 import time
+from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import chi2
 
 from jointscope.factors.calibration import DYNAMICS, Calibration
 from jointscope.graphs.poses.determined import Determined, determined
@@ -23,7 +23,15 @@ from jointscope.graphs.poses.pose_set import PoseSet
 from jointscope.graphs.poses.screen_poses import screen_poses
 from jointscope.graphs.poses.tip_errors import TipErrors, tip_errors
 from jointscope.graphs.poses.tracker_start import placed
-from jointscope.graphs.poses.trimmed_poses import CHANCE, TrimmedPoses
+from jointscope.graphs.poses.trimmed_poses import (
+    MOST_OUT,
+    OUTLYING,
+    Outlier,
+    as_one_target,
+    squared_distances,
+    without_hidden,
+    without_outliers,
+)
 from jointscope.graphs.poses.two_noises import noise_ratios
 from jointscope.graphs.solving.batch_solver import Progress, solve
 from jointscope.graphs.solving.estimate import Estimate
@@ -39,8 +47,6 @@ from jointscope.robots.recordings.poses import Poses
 Array = NDArray[np.float64]
 PASSES = 12  # of repeatability and outliers
 AGREES = 0.02  # relative change of the repeatability that asks for no further pass
-OUTLYING = 21.1  # squared distance in sigmas that one pose in ten thousand exceeds (chi2 of 3 degrees of freedom)
-MOST_OUT = 0.2  # share of the poses that may be left out
 MOST_ITERATIONS = 400  # milliseconds each; stiffnesses that an effect which is missing pulls along go a long way
 TOUCHED = 0.98  # of its prior's sigma: a value whose sigma stays above it was told nothing
 
@@ -61,7 +67,9 @@ class PoseCalibration:
         determined: which geometric errors these poses tell apart.
         repeatability: factor on the sigmas of the joints that the robot file had.
         chi2: of the residuals per degree of freedom.
-        left_out: path, name of the pose and its distance in sigmas.
+        left_out: path, name of the pose and its distance in sigmas; the name of a target that alone was left out is
+            behind that of the pose.
+        odd_targets: of each of these the target that alone was left out; empty where the whole pose was.
         iterations: of all passes.
         wall_seconds: of the whole.
     """
@@ -78,6 +86,7 @@ class PoseCalibration:
     repeatability: float
     chi2: float
     left_out: tuple[tuple[str, str, float], ...]
+    odd_targets: tuple[str, ...]
     iterations: int
     wall_seconds: float
 
@@ -116,7 +125,7 @@ def calibrate_poses(
     robot, problems = placed(robot, sessions)
     screen_poses(problems)
     before = tuple(tip_errors(problem) for problem in problems)
-    out: list[tuple[str, str, float]] = []
+    out: list[Outlier] = []
     scale, turning, weighted, iterations = 1.0, 1.0, False, 0
     known: Sequence[Calibration] = ()
     for i in range(PASSES):
@@ -131,20 +140,16 @@ def calibrate_poses(
                 "units, axes or names may be wrong: look at what `jointscope compare ROBOT --poses POSES` says"
             )
         if i == 0:
-            problems, out = _without_hidden(robot, problems, known[: len(problems)])
+            problems, out = without_hidden(robot, problems, known[: len(problems)])
         if i == 0 and out:
             continue
         distances = [squared_distances(p, c) for p, c in zip(problems, known, strict=False)]
-        far = [d * _as_one_target(p) for p, d in zip(problems, distances, strict=True)]
+        far = [d * as_one_target(p.targets.there.sum(axis=1)) for p, d in zip(problems, distances, strict=True)]
         worst = max(float(d.max()) for d in far)
         if weighted and i < PASSES - 1 and worst > OUTLYING:
-            problems, found = _without_outliers(problems, far, max(OUTLYING, 0.25 * worst))
+            problems, found = without_outliers(problems, known[: len(problems)], far, max(OUTLYING, 0.25 * worst))
             out += found
-            if len(out) > MOST_OUT * sum(map(len, sessions)):
-                raise SolveError(
-                    f"{len(out)} poses fit no arm, as {out[0][1]} of {out[0][0]} by {out[0][2]:.0f} sigma: check joint "
-                    "angles that had not settled, targets that were lost, and names and units of columns"
-                )
+            _must_be_few(out, problems, sum(map(len, sessions)))
             continue
         covariance = posteriors(everything, solution)[1]
         pairs = zip(others, known[len(problems) :], strict=True)
@@ -179,16 +184,26 @@ def _estimate(problems: Sequence[SetProblem], known: Sequence[Calibration]) -> E
     return Estimate(tuple(x for x, _ in starts), tuple(found))
 
 
-def squared_distances(problem: PoseSet, calibration: Calibration) -> Array:
-    """Squared distance of each pose in sigmas, transmissions and noise of the target together, shape (m,)."""
-    point = problem.point(calibration)
-    r = problem.misses(point, calibration)
-    return np.asarray(np.einsum("mk,mk->m", r, np.linalg.solve(problem.covariances(point), r[:, :, None])[:, :, 0]))
-
-
-def _as_one_target(problem: PoseSet) -> Array:
-    """What makes squared distances of poses with any number of coordinates as unlikely as those with three."""
-    return np.asarray(chi2.isf(CHANCE, 3) / chi2.isf(CHANCE, problem.targets.there.sum(axis=1)))
+def _must_be_few(out: Sequence[Outlier], problems: Sequence[PoseSet], poses: int) -> None:
+    """No more than a fifth of the poses, and of the sightings of any target, is left out."""
+    whole, odd = sum(not each.target for each in out), Counter(each.target for each in out if each.target)
+    first, hint = out[0], "check joint angles that had not settled, targets that were lost, and names and units"
+    if whole > MOST_OUT * poses:
+        first = next(each for each in out if not each.target)
+        raise SolveError(
+            f"{whole} poses fit no arm, as {first.pose} of {first.path} by {first.sigmas:.0f} sigma: {hint} of columns"
+        )
+    for target, count in odd.most_common():
+        left = sum(
+            int(np.isfinite(s.place[:, 0]).sum()) for p in problems for s in p.targets.sightings if s.name == target
+        )
+        if whole + count > MOST_OUT * (left + whole + count):
+            first = next(each for each in out if each.target == target)
+            raise SolveError(
+                f"the target {target} does not fit in {count} of the {left + count} poses that show it, while the "
+                f"others do, as in {first.pose} of {first.path} by {first.sigmas:.0f} sigma: it is loose on the tool, "
+                "has moved there, or is seen badly; fix it, or leave out its rows"
+            )
 
 
 def _changes(
@@ -221,29 +236,6 @@ def _chi2(
     return float(sum(d.sum() for d in distances)) / max(rows - used, 1.0)
 
 
-def _without_outliers(
-    problems: Sequence[PoseSet], distances: Sequence[Array], limit: float
-) -> tuple[list[PoseSet], list[tuple[str, str, float]]]:
-    """The sessions without poses beyond a limit: the worst ones first, for they pull others along."""
-    kept, out = [], []
-    for problem, found in zip(problems, distances, strict=True):
-        far = found > limit
-        poses = problem.poses
-        out += [(poses.path, poses.names[i], float(np.sqrt(found[i]))) for i in np.flatnonzero(far)]
-        kept.append(replace(problem, poses=poses.only(~far)))
-    return kept, out
-
-
-def _without_hidden(
-    robot: Robot, problems: list[PoseSet], known: Sequence[Calibration]
-) -> tuple[list[PoseSet], list[tuple[str, str, float]]]:
-    """The sessions without poses that hide each other in a fit of all."""
-    at = robot.with_values(dict(zip(known[0].names, known[0].values.tolist(), strict=True)))
-    squares = TrimmedPoses(at, problems, known, MOST_OUT).outlying() ** 2
-    ends = np.cumsum([len(problem.poses) for problem in problems])[:-1]
-    return _without_outliers(problems, np.split(squares, ends), 0.0)
-
-
 def _result(
     robot: Robot,
     problems: Sequence[PoseSet],
@@ -251,7 +243,7 @@ def _result(
     covariance: Array,
     before: tuple[TipErrors, ...],
     ratio: float,
-    out: Sequence[tuple[str, str, float]],
+    out: Sequence[Outlier],
     iterations: int,
     seconds: float,
 ) -> PoseCalibration:
@@ -275,7 +267,7 @@ def _result(
     errors = tuple(tip_errors(problem, c) for problem, c in zip(problems, calibrations, strict=True))
     return PoseCalibration(
         found, robot, tuple(problems), tuple(calibrations), first.names, own, errors, before, told, scale, ratio,
-        tuple(out), iterations, seconds,
+        tuple((o.path, o.name, o.sigmas) for o in out), tuple(o.target for o in out), iterations, seconds,
     )  # fmt: skip
 
 

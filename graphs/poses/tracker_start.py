@@ -99,7 +99,7 @@ def is_open(robot: Robot, owner: str) -> bool:
 
 
 def _with_other_targets(robot: Robot, problems: Sequence[PoseSet]) -> Robot:
-    """Places of further targets on the tool, where they are not known: the mean of what the poses say."""
+    """Places of further targets on the tool, where they are not known: the middle of what the poses say."""
     (_, first), *others = mounts(robot).items()
     values: dict[str, float] = {}
     for name, mount in others:
@@ -113,7 +113,7 @@ def _with_other_targets(robot: Robot, problems: Sequence[PoseSet]) -> Robot:
         seen = np.concatenate(shifts)
         seen = seen[np.isfinite(seen[:, 0])]
         if len(seen):
-            values |= {f"{name}.{part}": float(v) for part, v in zip(LENGTHS, seen.mean(axis=0), strict=True)}
+            values |= {f"{name}.{part}": float(v) for part, v in zip(LENGTHS, np.median(seen, axis=0), strict=True)}
     return robot.with_values(values)
 
 

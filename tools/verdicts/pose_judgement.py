@@ -3,6 +3,8 @@
 
 from __future__ import annotations
 
+from collections import Counter
+
 import numpy as np
 from scipy.special import gammaincc
 
@@ -83,12 +85,17 @@ def _solved(result: PoseCalibration) -> list[tuple[PoseSet, Calibration]]:
 
 
 def _outliers(result: PoseCalibration) -> Check:
-    name, out = "Poses that fit", len(result.left_out)
-    total = result.count + out
-    if out <= OUT * total:
-        return Check("good", name, f"{total - out} of {total} poses fit.")
-    text = "look at each before you leave them out for good: targets or readings are wrong, or an effect is missing"
-    return Check("warn", name, f"{out} of {total} poses were left out; {text}.")
+    name, whole = "Poses that fit", result.odd_targets.count("")
+    total, seen = result.count + whole, Counter(summary(result.errors).names)
+    odd = Counter(target for target in result.odd_targets if target)
+    text = f"{total - whole} of {total} poses fit"
+    text += "".join(f", {target} not in {count} of {seen[target] + count}" for target, count in odd.items())
+    shares = [whole / total, *((whole + n) / (seen[target] + whole + n) for target, n in odd.items())]
+    if max(shares) <= OUT:
+        return Check("good", name, f"{text}.")
+    hint = "look at each before you leave them out for good: targets or readings are wrong, or an effect is missing"
+    out = "".join(f", {target} of {count} of {seen[target] + count}" for target, count in odd.items())
+    return Check("warn", name, f"{whole} of {total} poses{out} were left out; {hint}.")
 
 
 def _still(result: PoseCalibration) -> Check:

@@ -16,7 +16,7 @@ from jointscope.graphs.poses.pose_set import PoseSet
 from jointscope.graphs.poses.tip_errors import tip_errors
 from jointscope.graphs.poses.tracker_start import placed
 from jointscope.graphs.rests.independent_states import reduced
-from jointscope.robots.errors import RecordingError
+from jointscope.robots.errors import RecordingError, SolveError
 from jointscope.robots.files.robot_file import load_robot
 from jointscope.robots.recordings.poses import Poses
 from jointscope.tools.simulator.pose_simulation import PoseConditions, simulate_poses
@@ -191,12 +191,55 @@ def test_a_target_in_another_place_on_the_tool_is_told_with_the_place(tmp_path, 
         calibrate_poses(wrong, [replace(simulated[0], others=simulated[0].others[:1])])
 
 
-def test_a_target_that_a_reflection_moved_is_left_out_with_its_pose(robot, simulated):
+@pytest.mark.parametrize("size", [1e-3, 3e-3])
+def test_a_target_that_a_reflection_moved_is_left_out_alone(robot, simulated, size):
     left, right = simulated[0].others
     place = left.place.copy()
-    place[11] += [0.0, 3e-3, 0.0]
+    place[[4, 11]] += [0.0, size, 0.0]
     found = calibrate_poses(robot, [replace(simulated[0], others=(replace(left, place=place), right))])
-    assert [name for _, name, _ in found.left_out] == ["11"]
+    assert sorted(name for _, name, _ in found.left_out) == ["11 (left)", "4 (left)"]
+    assert found.count == 30 and found.problems[0].measured == 3 * (90 - 2)
+    truth = simulated[1]["parameters"]
+    for name in ("left.lx", "left.ly", *WRIST):
+        assert abs(found.robot.parameters[name].value - truth[name]) < 3.5 * found.robot.parameters[name].sigma, name
+
+
+def test_angles_that_are_off_take_the_whole_pose_with_them(robot, simulated):
+    q = simulated[0].q.copy()
+    q[11, 1] += 3e-3
+    assert [name for _, name, _ in calibrate_poses(robot, [replace(simulated[0], q=q)]).left_out] == ["11"]
+
+
+def test_a_target_that_comes_loose_is_named_as_the_one(robot, simulated):
+    left, right = simulated[0].others
+    place = left.place + 2e-3 * np.random.default_rng(1).standard_normal((30, 3))
+    with pytest.raises(SolveError, match=r"the target left does not fit in .* of the 30 poses that show it, while the"):
+        calibrate_poses(robot, [replace(simulated[0], others=(replace(left, place=place), right))])
+
+
+def test_targets_that_are_wrong_in_some_poses_are_told_with_these_poses(robot, simulated):
+    poses = simulated[0]
+    left, right = poses.others
+    some = np.isin(np.arange(30), [3, 9, 20])[:, None]
+    exchanged = replace(
+        poses,
+        target=np.where(some, left.place, poses.target),
+        others=(replace(left, place=np.where(some, poses.target, left.place)), right),
+    )
+    with pytest.raises(RecordingError, match="targets reflector and left seem to be exchanged in pose 3, 9, 20: the"):
+        calibrate_poses(robot, [exchanged])
+    for k, other in enumerate((left, right)):
+        far = replace(other, place=other.place + 0.6 * (np.arange(30) == 7)[:, None])
+        others = (far, right) if k == 0 else (left, far)
+        with pytest.raises(RecordingError, match=f"target {other.name} is off by up to .* mm in pose 7 and fits in"):
+            calibrate_poses(robot, [replace(poses, others=others)])
+        milli = (
+            (replace(left, place=1e3 * left.place), right)
+            if k == 0
+            else (left, replace(right, place=1e3 * right.place))
+        )
+        with pytest.raises(RecordingError, match=f"places of {other.name} are about 1000 times as far apart as those"):
+            calibrate_poses(robot, [replace(poses, others=milli)])
 
 
 def test_balls_in_sockets_may_be_several_and_each_is_found_on_the_tool(tmp_path):
