@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from jointscope.factors.calibration import DYNAMICS, Calibration
 from jointscope.graphs.poses.determined import Determined, determined
-from jointscope.graphs.poses.linear_poses import filled
+from jointscope.graphs.poses.linear_poses import LinearPoses, filled
 from jointscope.graphs.poses.pose_set import PoseSet
 from jointscope.graphs.poses.screen_poses import screen_poses
 from jointscope.graphs.poses.tip_errors import TipErrors, tip_errors
@@ -29,10 +29,12 @@ from jointscope.graphs.poses.trimmed_poses import (
     Outlier,
     as_one_target,
     squared_distances,
+    with_fitted,
     without_hidden,
     without_outliers,
 )
 from jointscope.graphs.poses.two_noises import noise_ratios
+from jointscope.graphs.poses.what_moved import what_moved
 from jointscope.graphs.solving.batch_solver import Progress, solve
 from jointscope.graphs.solving.estimate import Estimate
 from jointscope.graphs.solving.posterior import posteriors
@@ -140,6 +142,7 @@ def calibrate_poses(
                 "units, axes or names may be wrong: look at what `jointscope compare ROBOT --poses POSES` says"
             )
         if i == 0:
+            whole = (problems, known[: len(problems)])
             problems, out = without_hidden(robot, problems, known[: len(problems)])
         if i == 0 and out:
             continue
@@ -149,7 +152,7 @@ def calibrate_poses(
         if weighted and i < PASSES - 1 and worst > OUTLYING:
             problems, found = without_outliers(problems, known[: len(problems)], far, max(OUTLYING, 0.25 * worst))
             out += found
-            _must_be_few(out, problems, sum(map(len, sessions)))
+            _must_be_few(out, problems, *whole)
             continue
         covariance = posteriors(everything, solution)[1]
         pairs = zip(others, known[len(problems) :], strict=True)
@@ -184,26 +187,34 @@ def _estimate(problems: Sequence[SetProblem], known: Sequence[Calibration]) -> E
     return Estimate(tuple(x for x, _ in starts), tuple(found))
 
 
-def _must_be_few(out: Sequence[Outlier], problems: Sequence[PoseSet], poses: int) -> None:
-    """No more than a fifth of the poses, and of the sightings of any target, is left out."""
-    whole, odd = sum(not each.target for each in out), Counter(each.target for each in out if each.target)
-    first, hint = out[0], "check joint angles that had not settled, targets that were lost, and names and units"
-    if whole > MOST_OUT * poses:
-        first = next(each for each in out if not each.target)
-        raise SolveError(
-            f"{whole} poses fit no arm, as {first.pose} of {first.path} by {first.sigmas:.0f} sigma: {hint} of columns"
-        )
-    for target, count in odd.most_common():
-        left = sum(
-            int(np.isfinite(s.place[:, 0]).sum()) for p in problems for s in p.targets.sightings if s.name == target
-        )
-        if whole + count > MOST_OUT * (left + whole + count):
-            first = next(each for each in out if each.target == target)
-            raise SolveError(
-                f"the target {target} does not fit in {count} of the {left + count} poses that show it, while the "
-                f"others do, as in {first.pose} of {first.path} by {first.sigmas:.0f} sigma: it is loose on the tool, "
-                "has moved there, or is seen badly; fix it, or leave out its rows"
-            )
+def _must_be_few(
+    out: Sequence[Outlier], problems: Sequence[PoseSet], whole: Sequence[PoseSet], known: Sequence[Calibration]
+) -> None:
+    """No more than a fifth of the poses, and of the sightings of any target, is left out.
+
+    Args:
+        out: what was left out.
+        problems: what was not.
+        whole: all poses.
+        known: calibrations from all poses.
+    """
+    poses, odd = sum(not each.target for each in out), Counter(each.target for each in out if each.target)
+    for target, count in [("", 0), *odd.most_common()]:
+        sightings = (s for p in problems for s in p.targets.sightings if s.name == target)
+        left = sum(int(np.isfinite(s.place[:, 0]).sum()) for s in sightings)
+        total = left + poses + count if target else sum(len(problem.poses) for problem in whole)
+        if poses + count <= MOST_OUT * total:
+            continue
+        first = next(each for each in out if each.target == target)
+        said = f"{poses} poses fit no arm"
+        hint = "check joint angles that had not settled, targets that were lost, and names and units of columns"
+        if target:
+            said = f"{target} does not fit in {count} of the {left + count} poses that show it, while other targets do"
+            hint = "it is loose on the tool, or is seen badly; fix it, or leave out its rows"
+        step = what_moved(LinearPoses.at(with_fitted(whole[0].robot, known), whole, known), whole, known)
+        if step is not None:
+            raise SolveError(f"{poses + count} poses fit no arm that is the same in all of them: {step.text}")
+        raise SolveError(f"{said}, as {first.pose} of {first.path} by {first.sigmas:.0f} sigma: {hint}")
 
 
 def _changes(

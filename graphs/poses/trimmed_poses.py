@@ -248,12 +248,16 @@ def without_outliers(
     return kept, out
 
 
+def with_fitted(robot: Robot, known: Sequence[Calibration]) -> Robot:
+    """A robot with the values of a fit."""
+    return robot.with_values(dict(zip(known[0].names, known[0].values.tolist(), strict=True)))
+
+
 def without_hidden(
     robot: Robot, problems: Sequence[PoseSet], known: Sequence[Calibration]
 ) -> tuple[list[PoseSet], list[Outlier]]:
     """The sessions without poses, or targets of them, that hide each other in a fit of all."""
-    at = robot.with_values(dict(zip(known[0].names, known[0].values.tolist(), strict=True)))
-    sigmas, odd = TrimmedPoses(at, problems, known, MOST_OUT).outlying()
+    sigmas, odd = TrimmedPoses(with_fitted(robot, known), problems, known, MOST_OUT).outlying()
     kept, out, start = [], list[Outlier](), 0
     for problem in problems:
         mine = slice(start, start + len(problem.poses))

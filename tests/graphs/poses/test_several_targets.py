@@ -7,15 +7,20 @@ from dataclasses import replace
 from itertools import islice
 
 import numpy as np
+import pinocchio as pin
 import pytest
 from tools_with_targets import tool_with
 
 from jointscope.factors.calibration import DYNAMICS, Calibration
-from jointscope.graphs.poses.calibrate_poses import calibrate_poses
+from jointscope.graphs.poses.calibrate_poses import _estimate, calibrate_poses
+from jointscope.graphs.poses.linear_poses import LinearPoses
 from jointscope.graphs.poses.pose_set import PoseSet
 from jointscope.graphs.poses.tip_errors import tip_errors
 from jointscope.graphs.poses.tracker_start import placed
+from jointscope.graphs.poses.trimmed_poses import with_fitted
+from jointscope.graphs.poses.what_moved import what_moved
 from jointscope.graphs.rests.independent_states import reduced
+from jointscope.graphs.solving.batch_solver import solve
 from jointscope.robots.errors import RecordingError, SolveError
 from jointscope.robots.files.robot_file import load_robot
 from jointscope.robots.recordings.poses import Poses
@@ -213,7 +218,9 @@ def test_angles_that_are_off_take_the_whole_pose_with_them(robot, simulated):
 def test_a_target_that_comes_loose_is_named_as_the_one(robot, simulated):
     left, right = simulated[0].others
     place = left.place + 2e-3 * np.random.default_rng(1).standard_normal((30, 3))
-    with pytest.raises(SolveError, match=r"the target left does not fit in .* of the 30 poses that show it, while the"):
+    with pytest.raises(
+        SolveError, match=r"left does not fit in .* of the 30 poses that show it, while other targets do, as"
+    ):
         calibrate_poses(robot, [replace(simulated[0], others=(replace(left, place=place), right))])
 
 
@@ -240,6 +247,45 @@ def test_targets_that_are_wrong_in_some_poses_are_told_with_these_poses(robot, s
         )
         with pytest.raises(RecordingError, match=f"places of {other.name} are about 1000 times as far apart as those"):
             calibrate_poses(robot, [replace(poses, others=milli)])
+
+
+@pytest.mark.parametrize("size", [3e-4, 1e-3])
+def test_a_target_that_slips_on_the_tool_is_named_with_the_pose_from_which_on(robot, simulated, size):
+    """Its shift on the tool, in axes that the kinematics of pinocchio turn."""
+    poses = simulated[0]
+    R, late = robot.tree.body_poses("reflector", poses.q)[0], np.arange(30) >= 13
+    left, right = poses.others
+    slipped = replace(left, place=left.place + late[:, None] * (R @ [0.6 * size, 0.0, 0.8 * size]))
+    step = step_of(robot, replace(poses, others=(slipped, right)))
+    assert (step.target, step.turned, step.before, step.after) == ("left", False, "12", "13")
+    assert abs(step.size - size) < 0.2 * size
+
+
+def test_a_target_that_turns_on_the_tool_is_named_and_so_is_a_tracker_that_moves(robot):
+    poses = simulate_poses(robot, 30, 3, PoseConditions(orientation=True))[0]
+    left, right = poses.others
+    late = (np.arange(30) >= 13)[:, None, None]
+    turned = replace(left, turn=np.where(late, left.turn @ pin.exp3(np.array([0.0, 2e-3, 0.0])), left.turn))
+    step = step_of(robot, replace(poses, others=(turned, right)))
+    assert (step.target, step.turned, step.after) == ("left", True, "13") and abs(step.size - 2e-3) < 4e-4
+    shift = late[:, 0] * np.array([3e-4, 0.0, 4e-4])
+    others = tuple(replace(other, place=other.place + shift) for other in poses.others)
+    step = step_of(robot, replace(poses, target=poses.target + shift, others=others))
+    assert (step.target, step.after) == ("", "13") and abs(step.size - 5e-4) < 1e-4
+    assert step_of(robot, poses) is None
+
+
+def step_of(robot, poses):
+    """What moved, as a calibration from these poses or its refusal says."""
+    try:
+        found = calibrate_poses(robot, [poses])
+    except SolveError as err:
+        robot, problems = placed(robot, [poses])
+        known = solve(problems, _estimate(problems, ()), max_iterations=400, progress=None).estimate.calibrations
+        step = what_moved(LinearPoses.at(with_fitted(robot, known), problems, known), problems, known)
+        assert step.text in str(err)
+        return step
+    return what_moved(LinearPoses.of(found), found.problems, found.calibrations)
 
 
 def test_balls_in_sockets_may_be_several_and_each_is_found_on_the_tool(tmp_path):
