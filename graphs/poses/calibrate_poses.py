@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from jointscope.factors.calibration import DYNAMICS, Calibration
 from jointscope.graphs.poses.determined import Determined, determined
 from jointscope.graphs.poses.linear_poses import LinearPoses, filled
-from jointscope.graphs.poses.pose_set import PoseSet
+from jointscope.graphs.poses.pose_set import TRACKER_POSE, PoseSet
 from jointscope.graphs.poses.screen_poses import screen_poses
 from jointscope.graphs.poses.tip_errors import TipErrors, tip_errors
 from jointscope.graphs.poses.tracker_start import placed
@@ -242,7 +242,7 @@ def _chi2(
     """Squared distances per degree of freedom that the fit has left; `elsewhere` is information of other kinds."""
     rows, index = sum(problem.measured for problem in problems), first.columns[DYNAMICS]
     prior = np.array([problems[0].robot.parameters[name].coordinate_sigma for name in first.names])
-    used = float(np.sum(1.0 - np.diag(covariance)[index] / prior**2)) + 3.0 * sum(len(p.contacts) for p in problems)
+    used = float(np.sum(1.0 - np.diag(covariance)[index] / prior**2)) + sum(p.own_coordinates for p in problems)
     used -= sum(float(np.sum(information * covariance[index, index])) for information in elsewhere)
     return float(sum(d.sum() for d in distances)) / max(rows - used, 1.0)
 
@@ -275,6 +275,8 @@ def _result(
     still = [np.zeros(problem.targets.there.shape) for problem in problems]
     columns = {n: [p.by_value.get(n, zero) for p, zero in zip(points, still, strict=True)] for n in order}
     told = determined({name: filled(each, 1) for name, each in columns.items()}, order)
+    pairs = list(zip(problems, calibrations, strict=True))
+    problems = [replace(p, tracker=c[TRACKER_POSE.name]) if p.own_tracker else p for p, c in pairs]
     errors = tuple(tip_errors(problem, c) for problem, c in zip(problems, calibrations, strict=True))
     return PoseCalibration(
         found, robot, tuple(problems), tuple(calibrations), first.names, own, errors, before, told, scale, ratio,

@@ -43,7 +43,7 @@ def judge_poses(result: PoseCalibration) -> Judgement:
 
 def _enough(result: PoseCalibration) -> Check:
     measured = sum(problem.measured for problem in result.problems)
-    contacts = 3 * sum(len(problem.contacts) for problem in result.problems)
+    contacts = sum(problem.own_coordinates for problem in result.problems)
     values = result.determined.rank + sum(n not in _geometric(result) for n in result.told)
     ratio = (measured - contacts) / max(values, 1)
     level = "good" if ratio >= REDUNDANT[0] else "warn" if ratio >= REDUNDANT[1] else "bad"
