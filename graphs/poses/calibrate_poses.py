@@ -158,7 +158,8 @@ def calibrate_poses(
         pairs = zip(others, known[len(problems) :], strict=True)
         elsewhere = [other.linearize(np.zeros((0, 1)), c).C for other, c in pairs]
         ratio = _chi2(problems, known[0], covariance, distances, elsewhere)
-        changes = _changes(problems, known[: len(problems)], covariance, ratio)
+        own = [solution.shared.indices(k) for k in range(len(problems))]
+        changes = _changes(problems, known[: len(problems)], [covariance[np.ix_(k, k)] for k in own], ratio)
         if np.all(np.abs(np.log(changes)) < AGREES):
             break
         scale, turning, weighted = float(scale * changes[0]), float(turning * changes[1]), True
@@ -218,14 +219,14 @@ def _must_be_few(
 
 
 def _changes(
-    problems: Sequence[PoseSet], calibrations: Sequence[Calibration], covariance: Array, ratio: float
+    problems: Sequence[PoseSet], calibrations: Sequence[Calibration], covariances: Sequence[Array], ratio: float
 ) -> tuple[float, float]:
     """Factors on the repeatability of the joints and on the noise of orientations that the residuals ask for."""
     setup = problems[0].robot.poses
     assert setup is not None
     by_joints, by_turns = ratio, 1.0
     if any(np.any(problem.targets.turns) for problem in problems):
-        by_joints, by_turns = noise_ratios(problems, calibrations, covariance)
+        by_joints, by_turns = noise_ratios(problems, calibrations, covariances)
     return (
         float(np.sqrt(by_joints)) if setup.estimate_sigma else 1.0,
         float(np.sqrt(by_turns)) if setup.estimate_turn_sigma else 1.0,
@@ -265,9 +266,8 @@ def _result(
     parameters = with_sigmas(found.parameters, dict(zip(first.names, sigmas.tolist(), strict=True)))
     assert robot.poses is not None
     scale, turning = problems[0].repeatability, problems[0].turning
-    setup = replace(
-        robot.poses, joint_sigmas=robot.poses.joint_sigmas * scale, turn_sigma=robot.poses.turn_sigma * turning
-    )
+    setup = replace(robot.poses, tracker=calibrations[0].points.get(TRACKER_POSE.name, robot.poses.tracker))
+    setup = replace(setup, joint_sigmas=setup.joint_sigmas * scale, turn_sigma=setup.turn_sigma * turning)
     found = replace(found, parameters=parameters, poses=setup)
     points = [problem.point(calibration) for problem, calibration in zip(problems, calibrations, strict=True)]
     names = (*error_names(problems[0].arm.chain.joints, setup.other_names), *_gaps(first))

@@ -49,8 +49,7 @@ class PoseSet:
         repeatability: factor on the joints' sigmas of the robot file.
         owner: number of the session; None for a whole one.
         turning: factor on the sigma of orientations of the robot file.
-        own_tracker: whether the tracker of this session stands elsewhere than that of the first one, so that its pose
-            is a value of its own.
+        own_tracker: whether nothing says where the tracker of this session stands, so that its pose is a value, too.
     """
 
     robot: Robot

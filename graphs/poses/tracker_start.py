@@ -71,7 +71,7 @@ def _with_trackers(robot: Robot, sessions: Sequence[Poses]) -> tuple[Robot, list
         problems = [problem.of_robot(robot) for problem in problems]
     found = [replace(problem, tracker=base_from_tracker(*_known_points(problem))[0]) for problem in problems]
     robot = replace(robot, poses=replace(setup, tracker=found[0].tracker))
-    own = [replace(problem, own_tracker=i > 0) for i, problem in enumerate(found)]
+    own = [replace(problem, own_tracker=not problem.poses.contacts) for problem in found]
     return robot, [problem.of_robot(robot) for problem in own]
 
 

@@ -169,7 +169,7 @@ def test_a_tracker_that_was_moved_between_sessions_is_estimated_with_the_arm(rob
     open_robot = replace(robot, poses=replace(robot.poses, tracker=None, tracker_link=None))
     other = elsewhere(simulate_poses(robot, 30, 3, PoseConditions(orientation=True), session="others")[0])
     found = calibrate_poses(open_robot, [simulated[0], other])
-    assert [problem.own_tracker for problem in found.problems] == [False, True]
+    assert [problem.own_tracker for problem in found.problems] == [True, True]
     assert len(found.left_out) < 3 and found.repeatability < 1.5
     assert all(errors.to_json()["rms_mm"] < 0.06 for errors in found.errors)
     truth = simulated[1]["parameters"]
