@@ -208,7 +208,7 @@ def _must_be_few(
             continue
         first = next(each for each in out if each.target == target)
         said = f"{poses} poses fit no arm"
-        hint = "check joint angles that had not settled, targets that were lost, and names and units of columns"
+        hint = "check joint angles that had not settled or were commanded, targets that were lost, names and units"
         if target:
             said = f"{target} does not fit in {count} of the {left + count} poses that show it, while other targets do"
             hint = "it is loose on the tool, or is seen badly; fix it, or leave out its rows"
