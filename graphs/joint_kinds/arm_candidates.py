@@ -13,9 +13,9 @@ from jointscope.graphs.frequency.calibrate_frequency import FrequencyCalibration
 from jointscope.graphs.frequency.linear_responses import STIFFNESSES, ResponseColumns
 from jointscope.graphs.joint_kinds.effect_judge import ArmCandidate, EffectJudge, Looked, with_look_alikes
 from jointscope.graphs.joint_kinds.linear_kinds import LinearKind, LinearKinds
+from jointscope.graphs.joint_kinds.ripple_orders import with_best_order
 from jointscope.graphs.poses.calibrate_poses import PoseCalibration
 from jointscope.graphs.poses.linear_poses import LinearPoses, columns_of, prior_information, prior_pull
-from jointscope.graphs.poses.ripple_orders import with_best_order
 from jointscope.robots.errors import RobotError
 from jointscope.robots.geometry.arm_effects import FREQUENCY, POSES, ArmHypothesis, hypotheses
 from jointscope.robots.geometry.error_parameters import WAVES

@@ -22,7 +22,8 @@ from jointscope.graphs.frequency.frequency_summary import FrequencySummary
 from jointscope.graphs.frequency.settled_stages import MOST_STAGES, settled_stages
 from jointscope.graphs.frequency.shaken_pose import ShakenPose
 from jointscope.graphs.frequency.stages import first_stage
-from jointscope.graphs.poses.calibrate_poses import AGREES, PoseCalibration, calibrate_poses, squared_distances
+from jointscope.graphs.poses.calibrate_poses import AGREES, PoseCalibration, calibrate_poses
+from jointscope.graphs.poses.trimmed_poses import squared_distances
 from jointscope.graphs.solving.batch_solver import Progress
 from jointscope.graphs.solving.solver_context import in_solver_context
 from jointscope.robots.model.robot import Robot

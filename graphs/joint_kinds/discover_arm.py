@@ -22,10 +22,11 @@ from jointscope.graphs.joint_kinds.arm_candidates import Calibrated, arm_candida
 from jointscope.graphs.joint_kinds.calibrate_kinds import MOST_PASSES, calibrate_kinds
 from jointscope.graphs.joint_kinds.effect_judge import ArmCandidate
 from jointscope.graphs.joint_kinds.spring_screen import badly_explained, screened_springs
-from jointscope.graphs.poses.calibrate_poses import PoseCalibration, calibrate_poses, squared_distances
+from jointscope.graphs.poses.calibrate_poses import PoseCalibration, calibrate_poses
 from jointscope.graphs.poses.pose_set import PoseSet
 from jointscope.graphs.poses.tip_errors import TipErrors, summary, tip_errors
 from jointscope.graphs.poses.tracker_start import placed
+from jointscope.graphs.poses.trimmed_poses import squared_distances
 from jointscope.robots.errors import SolveError
 from jointscope.robots.geometry.added_effect import with_effect
 from jointscope.robots.geometry.arm_effects import FREQUENCY, POSES

@@ -8,23 +8,33 @@ are left out by name, and both are repeated until nothing changes.
 from __future__ import annotations
 
 import time
+from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import chi2
 
 from jointscope.factors.calibration import DYNAMICS, Calibration
 from jointscope.graphs.poses.determined import Determined, determined
-from jointscope.graphs.poses.linear_poses import filled
-from jointscope.graphs.poses.pose_set import PoseSet
+from jointscope.graphs.poses.linear_poses import LinearPoses, filled
+from jointscope.graphs.poses.pose_set import TRACKER_POSE, PoseSet
 from jointscope.graphs.poses.screen_poses import screen_poses
 from jointscope.graphs.poses.tip_errors import TipErrors, tip_errors
 from jointscope.graphs.poses.tracker_start import placed
-from jointscope.graphs.poses.trimmed_poses import CHANCE, TrimmedPoses
+from jointscope.graphs.poses.trimmed_poses import (
+    MOST_OUT,
+    OUTLYING,
+    Outlier,
+    as_one_target,
+    squared_distances,
+    with_fitted,
+    without_hidden,
+    without_outliers,
+)
 from jointscope.graphs.poses.two_noises import noise_ratios
+from jointscope.graphs.poses.what_moved import what_moved
 from jointscope.graphs.solving.batch_solver import Progress, solve
 from jointscope.graphs.solving.estimate import Estimate
 from jointscope.graphs.solving.posterior import posteriors
@@ -39,8 +49,6 @@ from jointscope.robots.recordings.poses import Poses
 Array = NDArray[np.float64]
 PASSES = 12  # of repeatability and outliers
 AGREES = 0.02  # relative change of the repeatability that asks for no further pass
-OUTLYING = 21.1  # squared distance in sigmas that one pose in ten thousand exceeds (chi2 of 3 degrees of freedom)
-MOST_OUT = 0.2  # share of the poses that may be left out
 MOST_ITERATIONS = 400  # milliseconds each; stiffnesses that an effect which is missing pulls along go a long way
 TOUCHED = 0.98  # of its prior's sigma: a value whose sigma stays above it was told nothing
 
@@ -61,7 +69,9 @@ class PoseCalibration:
         determined: which geometric errors these poses tell apart.
         repeatability: factor on the sigmas of the joints that the robot file had.
         chi2: of the residuals per degree of freedom.
-        left_out: path, name of the pose and its distance in sigmas.
+        left_out: path, name of the pose and its distance in sigmas; the name of a target that alone was left out is
+            behind that of the pose.
+        odd_targets: of each of these the target that alone was left out; empty where the whole pose was.
         iterations: of all passes.
         wall_seconds: of the whole.
     """
@@ -78,6 +88,7 @@ class PoseCalibration:
     repeatability: float
     chi2: float
     left_out: tuple[tuple[str, str, float], ...]
+    odd_targets: tuple[str, ...]
     iterations: int
     wall_seconds: float
 
@@ -116,7 +127,7 @@ def calibrate_poses(
     robot, problems = placed(robot, sessions)
     screen_poses(problems)
     before = tuple(tip_errors(problem) for problem in problems)
-    out: list[tuple[str, str, float]] = []
+    out: list[Outlier] = []
     scale, turning, weighted, iterations = 1.0, 1.0, False, 0
     known: Sequence[Calibration] = ()
     for i in range(PASSES):
@@ -131,26 +142,24 @@ def calibrate_poses(
                 "units, axes or names may be wrong: look at what `jointscope compare ROBOT --poses POSES` says"
             )
         if i == 0:
-            problems, out = _without_hidden(robot, problems, known[: len(problems)])
+            whole = (problems, known[: len(problems)])
+            problems, out = without_hidden(robot, problems, known[: len(problems)])
         if i == 0 and out:
             continue
         distances = [squared_distances(p, c) for p, c in zip(problems, known, strict=False)]
-        far = [d * _as_one_target(p) for p, d in zip(problems, distances, strict=True)]
+        far = [d * as_one_target(p.targets.there.sum(axis=1)) for p, d in zip(problems, distances, strict=True)]
         worst = max(float(d.max()) for d in far)
         if weighted and i < PASSES - 1 and worst > OUTLYING:
-            problems, found = _without_outliers(problems, far, max(OUTLYING, 0.25 * worst))
+            problems, found = without_outliers(problems, known[: len(problems)], far, max(OUTLYING, 0.25 * worst))
             out += found
-            if len(out) > MOST_OUT * sum(map(len, sessions)):
-                raise SolveError(
-                    f"{len(out)} poses fit no arm, as {out[0][1]} of {out[0][0]} by {out[0][2]:.0f} sigma: check joint "
-                    "angles that had not settled, targets that were lost, and names and units of columns"
-                )
+            _must_be_few(out, problems, *whole)
             continue
         covariance = posteriors(everything, solution)[1]
         pairs = zip(others, known[len(problems) :], strict=True)
         elsewhere = [other.linearize(np.zeros((0, 1)), c).C for other, c in pairs]
         ratio = _chi2(problems, known[0], covariance, distances, elsewhere)
-        changes = _changes(problems, known[: len(problems)], covariance, ratio)
+        own = [solution.shared.indices(k) for k in range(len(problems))]
+        changes = _changes(problems, known[: len(problems)], [covariance[np.ix_(k, k)] for k in own], ratio)
         if np.all(np.abs(np.log(changes)) < AGREES):
             break
         scale, turning, weighted = float(scale * changes[0]), float(turning * changes[1]), True
@@ -179,27 +188,45 @@ def _estimate(problems: Sequence[SetProblem], known: Sequence[Calibration]) -> E
     return Estimate(tuple(x for x, _ in starts), tuple(found))
 
 
-def squared_distances(problem: PoseSet, calibration: Calibration) -> Array:
-    """Squared distance of each pose in sigmas, transmissions and noise of the target together, shape (m,)."""
-    point = problem.point(calibration)
-    r = problem.misses(point, calibration)
-    return np.asarray(np.einsum("mk,mk->m", r, np.linalg.solve(problem.covariances(point), r[:, :, None])[:, :, 0]))
+def _must_be_few(
+    out: Sequence[Outlier], problems: Sequence[PoseSet], whole: Sequence[PoseSet], known: Sequence[Calibration]
+) -> None:
+    """No more than a fifth of the poses, and of the sightings of any target, is left out.
 
-
-def _as_one_target(problem: PoseSet) -> Array:
-    """What makes squared distances of poses with any number of coordinates as unlikely as those with three."""
-    return np.asarray(chi2.isf(CHANCE, 3) / chi2.isf(CHANCE, problem.targets.there.sum(axis=1)))
+    Args:
+        out: what was left out.
+        problems: what was not.
+        whole: all poses.
+        known: calibrations from all poses.
+    """
+    poses, odd = sum(not each.target for each in out), Counter(each.target for each in out if each.target)
+    for target, count in [("", 0), *odd.most_common()]:
+        sightings = (s for p in problems for s in p.targets.sightings if s.name == target)
+        left = sum(int(np.isfinite(s.place[:, 0]).sum()) for s in sightings)
+        total = left + poses + count if target else sum(len(problem.poses) for problem in whole)
+        if poses + count <= MOST_OUT * total:
+            continue
+        first = next(each for each in out if each.target == target)
+        said = f"{poses} poses fit no arm"
+        hint = "check joint angles that had not settled or were commanded, targets that were lost, names and units"
+        if target:
+            said = f"{target} does not fit in {count} of the {left + count} poses that show it, while other targets do"
+            hint = "it is loose on the tool, or is seen badly; fix it, or leave out its rows"
+        step = what_moved(LinearPoses.at(with_fitted(whole[0].robot, known), whole, known), whole, known)
+        if step is not None:
+            raise SolveError(f"{poses + count} poses fit no arm that is the same in all of them: {step.text}")
+        raise SolveError(f"{said}, as {first.pose} of {first.path} by {first.sigmas:.0f} sigma: {hint}")
 
 
 def _changes(
-    problems: Sequence[PoseSet], calibrations: Sequence[Calibration], covariance: Array, ratio: float
+    problems: Sequence[PoseSet], calibrations: Sequence[Calibration], covariances: Sequence[Array], ratio: float
 ) -> tuple[float, float]:
     """Factors on the repeatability of the joints and on the noise of orientations that the residuals ask for."""
     setup = problems[0].robot.poses
     assert setup is not None
     by_joints, by_turns = ratio, 1.0
     if any(np.any(problem.targets.turns) for problem in problems):
-        by_joints, by_turns = noise_ratios(problems, calibrations, covariance)
+        by_joints, by_turns = noise_ratios(problems, calibrations, covariances)
     return (
         float(np.sqrt(by_joints)) if setup.estimate_sigma else 1.0,
         float(np.sqrt(by_turns)) if setup.estimate_turn_sigma else 1.0,
@@ -216,32 +243,9 @@ def _chi2(
     """Squared distances per degree of freedom that the fit has left; `elsewhere` is information of other kinds."""
     rows, index = sum(problem.measured for problem in problems), first.columns[DYNAMICS]
     prior = np.array([problems[0].robot.parameters[name].coordinate_sigma for name in first.names])
-    used = float(np.sum(1.0 - np.diag(covariance)[index] / prior**2)) + 3.0 * sum(len(p.contacts) for p in problems)
+    used = float(np.sum(1.0 - np.diag(covariance)[index] / prior**2)) + sum(p.own_coordinates for p in problems)
     used -= sum(float(np.sum(information * covariance[index, index])) for information in elsewhere)
     return float(sum(d.sum() for d in distances)) / max(rows - used, 1.0)
-
-
-def _without_outliers(
-    problems: Sequence[PoseSet], distances: Sequence[Array], limit: float
-) -> tuple[list[PoseSet], list[tuple[str, str, float]]]:
-    """The sessions without poses beyond a limit: the worst ones first, for they pull others along."""
-    kept, out = [], []
-    for problem, found in zip(problems, distances, strict=True):
-        far = found > limit
-        poses = problem.poses
-        out += [(poses.path, poses.names[i], float(np.sqrt(found[i]))) for i in np.flatnonzero(far)]
-        kept.append(replace(problem, poses=poses.only(~far)))
-    return kept, out
-
-
-def _without_hidden(
-    robot: Robot, problems: list[PoseSet], known: Sequence[Calibration]
-) -> tuple[list[PoseSet], list[tuple[str, str, float]]]:
-    """The sessions without poses that hide each other in a fit of all."""
-    at = robot.with_values(dict(zip(known[0].names, known[0].values.tolist(), strict=True)))
-    squares = TrimmedPoses(at, problems, known, MOST_OUT).outlying() ** 2
-    ends = np.cumsum([len(problem.poses) for problem in problems])[:-1]
-    return _without_outliers(problems, np.split(squares, ends), 0.0)
 
 
 def _result(
@@ -251,7 +255,7 @@ def _result(
     covariance: Array,
     before: tuple[TipErrors, ...],
     ratio: float,
-    out: Sequence[tuple[str, str, float]],
+    out: Sequence[Outlier],
     iterations: int,
     seconds: float,
 ) -> PoseCalibration:
@@ -262,9 +266,8 @@ def _result(
     parameters = with_sigmas(found.parameters, dict(zip(first.names, sigmas.tolist(), strict=True)))
     assert robot.poses is not None
     scale, turning = problems[0].repeatability, problems[0].turning
-    setup = replace(
-        robot.poses, joint_sigmas=robot.poses.joint_sigmas * scale, turn_sigma=robot.poses.turn_sigma * turning
-    )
+    setup = replace(robot.poses, tracker=calibrations[0].points.get(TRACKER_POSE.name, robot.poses.tracker))
+    setup = replace(setup, joint_sigmas=setup.joint_sigmas * scale, turn_sigma=setup.turn_sigma * turning)
     found = replace(found, parameters=parameters, poses=setup)
     points = [problem.point(calibration) for problem, calibration in zip(problems, calibrations, strict=True)]
     names = (*error_names(problems[0].arm.chain.joints, setup.other_names), *_gaps(first))
@@ -272,10 +275,12 @@ def _result(
     still = [np.zeros(problem.targets.there.shape) for problem in problems]
     columns = {n: [p.by_value.get(n, zero) for p, zero in zip(points, still, strict=True)] for n in order}
     told = determined({name: filled(each, 1) for name, each in columns.items()}, order)
+    pairs = list(zip(problems, calibrations, strict=True))
+    problems = [replace(p, tracker=c[TRACKER_POSE.name]) if p.own_tracker else p for p, c in pairs]
     errors = tuple(tip_errors(problem, c) for problem, c in zip(problems, calibrations, strict=True))
     return PoseCalibration(
         found, robot, tuple(problems), tuple(calibrations), first.names, own, errors, before, told, scale, ratio,
-        tuple(out), iterations, seconds,
+        tuple((o.path, o.name, o.sigmas) for o in out), tuple(o.target for o in out), iterations, seconds,
     )  # fmt: skip
 
 

@@ -78,7 +78,7 @@ class LinearPoses:
         shared = calibrations[0].names
         pieces, ties, places = [], [], list[NDArray[np.intp]]()
         names, held, size = list[str](), list[int](), len(shared)
-        total = size + 3 * sum(len(problem.contacts) for problem in problems)
+        total = size + sum(problem.own_coordinates for problem in problems)
         tied = np.diag(np.full(total, SPREAD**-2.0))
         tied[:size, :size], pull = prior_information(robot, shared), np.zeros(total)
         pull[:size] = prior_pull(robot, shared)
@@ -96,7 +96,7 @@ class LinearPoses:
             apart[:, place] = own_apart
             ties.append((off, apart))
             places.append(place)
-            number = {contact: (first - size) // 3 + i for i, contact in enumerate(problem.contacts)}
+            number = {contact: first + 3 * i for i, contact in enumerate(problem.contacts)}
             held += [number[c] for c in problem.poses.contacts] or [-1] * len(problem.poses)
             names += problem.poses.groups
             first += len(own)

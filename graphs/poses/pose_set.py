@@ -17,16 +17,20 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from jointscope.factors.block import POINT, Block
+from jointscope.factors.block import POINT, POSE3, Block
 from jointscope.factors.calibration import DYNAMICS, Calibration
 from jointscope.graphs.poses.sagging_arm import SaggingArm, SaggingPoint, in_tracker
 from jointscope.graphs.poses.seen_targets import SeenTargets
 from jointscope.graphs.rests.independent_states import of_independent_states
 from jointscope.graphs.solving.normal_equations import NormalEquations
+from jointscope.robots.geometry.rotations import log_slopes
 from jointscope.robots.model.robot import Robot
 from jointscope.robots.recordings.poses import Poses
 
 Array = NDArray[np.float64]
+
+
+TRACKER_POSE = Block("tracker_pose", POSE3, "recording", 6, "t")
 
 
 def contact_block(contact: str) -> str:
@@ -45,6 +49,7 @@ class PoseSet:
         repeatability: factor on the joints' sigmas of the robot file.
         owner: number of the session; None for a whole one.
         turning: factor on the sigma of orientations of the robot file.
+        own_tracker: whether nothing says where the tracker of this session stands, so that its pose is a value, too.
     """
 
     robot: Robot
@@ -53,6 +58,7 @@ class PoseSet:
     repeatability: float = 1.0
     owner: int | None = None
     turning: float = 1.0
+    own_tracker: bool = False
 
     kind = "poses"
     priors = ()
@@ -107,6 +113,8 @@ class PoseSet:
     def start(self, common: Calibration) -> tuple[Array, Calibration]:
         """No transmission error; contacts where the start values have the target on average."""
         calibration = common.only([DYNAMICS])
+        if self.own_tracker:
+            calibration = calibration.with_blocks([(TRACKER_POSE, self.tracker)])
         if self.contacts:
             target = self.point(calibration).target
             named = np.array(self.poses.contacts)
@@ -130,13 +138,14 @@ class PoseSet:
             calibration: the values.
             e: what transmissions do unseen, shape (m, n) [rad]; None for nothing.
         """
-        return self.seen(self.values(calibration), e)
+        tracker = calibration[TRACKER_POSE.name] if TRACKER_POSE.name in calibration.layout else self.tracker
+        return self.seen(self.values(calibration), e, tracker)
 
-    def seen(self, values: Mapping[str, float], e: Array | None = None) -> SaggingPoint:
-        """The same for values of all parameters by name."""
+    def seen(self, values: Mapping[str, float], e: Array | None = None, tracker: Array | None = None) -> SaggingPoint:
+        """The same for values of all parameters by name, and a tracker that may stand elsewhere."""
         found = self.arm.at(self.q, np.zeros_like(self.q) if e is None else e, values, not self.targets.plain)
         if not self.poses.contacts:
-            found = in_tracker(found, self.tracker, values, self.poses.shares)
+            found = in_tracker(found, self.tracker if tracker is None else tracker, values, self.poses.shares)
         return self.targets.rows(found, values)
 
     def columns(self, point: SaggingPoint, calibration: Calibration) -> Array:
@@ -146,10 +155,25 @@ class PoseSet:
         for i, (name, scale) in enumerate(zip(calibration.names, calibration.value_by_coordinate, strict=True)):
             if name in point.by_value:
                 J[:, :, start + i] = scale * point.by_value[name]
+        if self.own_tracker:
+            J[:, :, calibration.columns[TRACKER_POSE.name]] = self._by_tracker(point)
         for contact in self.contacts:
             here = [c == contact for c in self.poses.contacts]
             J[here, :, calibration.columns[contact_block(contact)]] = -np.eye(3)
         return J
+
+    def _by_tracker(self, point: SaggingPoint) -> Array:
+        """Derivative of the rows by a turn and a shift of the tracker in its own axes, shape (m, k, 6).
+
+        What is seen at p is seen at exp(-w) (p - v), and turned by exp(-w).
+        """
+        seen = point.target.reshape(len(point.target), -1, 3)
+        slopes, turns = np.zeros((*seen.shape, 6)), self.targets.turns[::3]
+        slopes[:, ~turns, :, :3] = -np.swapaxes(np.cross(np.eye(3), seen[:, ~turns, None]), 2, 3)
+        slopes[:, ~turns, :, 3:] = -np.eye(3)
+        for i in np.flatnonzero(turns):
+            slopes[:, i, :, :3] = -log_slopes(seen[:, i])
+        return np.asarray(self.targets.there[:, :, None] * slopes.reshape(len(seen), -1, 6))
 
     def misses(self, point: SaggingPoint, calibration: Calibration) -> Array:
         """Rows of what is predicted less what was measured, shape (m, k) [m], [rad]."""
@@ -161,6 +185,11 @@ class PoseSet:
         """Of what is missed: transmissions and noise of the target, shape (m, k, k) [m^2], [rad^2]."""
         J = point.by_joint * self.sigmas
         return np.asarray(J @ np.swapaxes(J, 1, 2) + np.diag(self.noise**2))
+
+    @property
+    def own_coordinates(self) -> int:
+        """Number of coordinates of values that are this session's alone: points of contacts, pose of the tracker."""
+        return 3 * len(self.contacts) + 6 * self.own_tracker
 
     @cached_property
     def pairs(self) -> dict[str, tuple[str, str]]:

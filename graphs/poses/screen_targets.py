@@ -36,6 +36,9 @@ MUCH_BETTER = 0.2  # of what is left, where names that were exchanged fit
 LARGEST_ERROR = 0.05  # [m] that errors of an arm can make
 LARGEST_TURN = 0.1  # [rad] the same
 ROUNDS = 20  # of turns before and behind the arm's
+SAME = 1e-6  # [rad]
+FEW = 0.2  # share of the sightings that may be wrong by themselves
+MILLI = (500.0, 2000.0)  # times as far apart as the arm puts them: millimetres
 LIKELY = 0.05  # [rad] that axes may be away from those that are named
 
 
@@ -55,9 +58,12 @@ def screen_targets(problem: PoseSet) -> None:
                 f"{' and more' * (len(lost) > 5)}: the tracker had lost it; remove these rows"
             )
     found = mounts(problem.robot)
+    _check_units(problem)
     known = [s for s in problem.targets.sightings if _is_known(problem, found[s.name])]
     for one, other in combinations(known, 2):
         _check_names(problem, one, other)
+    for one, other in combinations(problem.targets.sightings, 2):
+        _check_some_names(problem, one, other)
 
 
 def screen_tool(problem: PoseSet) -> None:
@@ -88,6 +94,41 @@ def _predicted(problem: PoseSet, name: str) -> Array:
     return np.asarray(point.target + point.turn @ (found[name].place(values) - first.place(values)))
 
 
+def _check_units(problem: PoseSet) -> None:
+    """Some targets may be in millimetres; where all are, that is told of the first."""
+    tool, wrong = tool_seen(problem)[0].target, []
+    for s in problem.targets.sightings:
+        there = np.isfinite(s.place[:, 0])
+        apart = [float(np.linalg.norm(np.std(x[there], axis=0))) for x in (s.place, tool)]
+        if there.sum() >= FEWEST and MILLI[0] < apart[0] / max(apart[1], 1e-12) < MILLI[1]:
+            wrong.append(s.name)
+    if wrong and len(wrong) < len(problem.targets.sightings):
+        raise RecordingError(
+            f"{problem.poses.path}: places of {', '.join(wrong)} are about 1000 times as far apart as those of the "
+            "other targets, as in millimetres; expected one unit for all, in a table that of poses.positions"
+        )
+
+
+def _some(problem: PoseSet, far: NDArray[np.bool_]) -> str:
+    """Names of some poses."""
+    names = [problem.poses.names[i] for i in np.flatnonzero(far)]
+    return ", ".join(names[:5]) + f" and {len(names) - 5} more" * (len(names) > 5)
+
+
+def _check_some_names(problem: PoseSet, one: Sighting, other: Sighting) -> None:
+    """Two targets may have each other's name in some poses: the way from one to the other is turned round there."""
+    there = np.isfinite(one.place[:, 0]) & np.isfinite(other.place[:, 0])
+    predicted, seen = _predicted(problem, one.name) - _predicted(problem, other.name), one.place - other.place
+    with np.errstate(invalid="ignore"):
+        right, turned = (np.linalg.norm(seen - sign * predicted, axis=1) for sign in (1.0, -1.0))
+        wrong = there & (right > FAR) & (turned < MUCH_BETTER * right)
+    if there.sum() >= FEWEST and 0 < wrong.sum() <= 0.5 * there.sum():
+        raise RecordingError(
+            f"{problem.poses.path}: the targets {one.name} and {other.name} seem to be exchanged in pose "
+            f"{_some(problem, wrong)}: the way from one to the other is turned round there; correct their names"
+        )
+
+
 def _check_names(problem: PoseSet, one: Sighting, other: Sighting) -> None:
     """Two targets may have each other's name: with both the other way round a tracker fits somewhere."""
     there = np.isfinite(one.place[:, 0]) & np.isfinite(other.place[:, 0])
@@ -112,6 +153,14 @@ def _check_place(problem: PoseSet, sighting: Sighting, mount: Mount) -> None:
     if there.sum() < FEWEST or misses < LARGEST_ERROR:
         return
     on_link = np.einsum("mji,mj->mi", point.turn[there] @ mount.R_link, away)
+    far = np.zeros(len(there), bool)
+    far[there] = _few_far(np.linalg.norm(on_link - np.median(on_link, axis=0), axis=1), LARGEST_ERROR)
+    if np.any(far):
+        raise RecordingError(
+            f"{problem.poses.path}: the target {sighting.name} is off by up to "
+            f"{1e3 * np.linalg.norm(away, axis=1).max():.3g} mm in pose {_some(problem, far)} and fits in the others: "
+            "something else was seen there; correct or remove these rows"
+        )
     shift = on_link.mean(axis=0)
     left = float(np.sqrt(np.mean(np.sum((on_link - shift) ** 2, axis=1))))
     assert problem.robot.poses is not None
@@ -135,6 +184,13 @@ def _check_turns(problem: PoseSet, sighting: Sighting, measured: Array, mount: M
     G, M = (tool_seen(problem)[0].turn @ mount.R_link)[there], measured[there]
     name, path = sighting.name, problem.poses.path
     left = _fits(G, M)
+    far = np.zeros(len(there), bool)
+    far[there] = _few_far(_off_the_others(np.swapaxes(G, 1, 2) @ M), LARGEST_TURN)
+    if np.any(far):
+        raise RecordingError(
+            f"{path}: the orientation of {name} is off by more than {LARGEST_TURN:g} rad in pose "
+            f"{_some(problem, far)} and fits in the others; correct it there, or leave its cells empty"
+        )
     if left > LARGEST_TURN:
         raise RecordingError(
             f"{path}: the orientations of {name} are off by {left:.2g} rad (rms) from any that turns with the tool; "
@@ -148,6 +204,22 @@ def _check_turns(problem: PoseSet, sighting: Sighting, measured: Array, mount: M
             f"{path}: {name} is not oriented on the tool as {problem.robot.path.name} says, off by {off:.2g} rad; "
             f"[{x:.3g}, {y:.3g}, {z:.3g}, {w:.3g}] would fit; leave out its `orientation`, and it is found"
         )
+
+
+def _few_far(away: Array, most: float) -> NDArray[np.bool_]:
+    """Which of some distances are large, shape (s,), if they are few and most of the others are small."""
+    far = away > most
+    few = far.sum() <= FEW * len(far) and np.median(away) < most / 5.0
+    return np.asarray(far if few else np.zeros_like(far))
+
+
+def _off_the_others(X: Array) -> Array:
+    """Angles of rotations of shape (s, 3, 3) from the mean of those that are near it, shape (s,) [rad]."""
+    kept, away = np.ones(len(X), bool), np.zeros(len(X))
+    for _ in range(ROUNDS):
+        away = np.linalg.norm(rotation_vectors(mean_rotation(X[kept]).T @ X), axis=1)
+        kept = away <= max(3.0 * float(np.median(away)), SAME)
+    return np.asarray(away)
 
 
 def _fits(G: Array, M: Array) -> float:

@@ -54,6 +54,7 @@ class SeenTargets:
         poses: the poses.
 
     Attributes:
+        first: name of the first target.
         plain: whether there is nothing but the place of the first target in every pose.
         sightings: of all targets that were seen, by their mount.
         there: which rows of which pose were measured, shape (m, k).
@@ -65,7 +66,7 @@ class SeenTargets:
 
     def __init__(self, robot: Robot, poses: Poses):
         self._mounts, self._poses = mounts(robot), poses
-        first = next(iter(self._mounts))
+        self.first = first = next(iter(self._mounts))
         strange = next((s for s in (*(s.name for s in poses.others), *poses.held) if s and s not in self._mounts), None)
         if strange:
             raise RecordingError(
@@ -100,6 +101,13 @@ class SeenTargets:
             return tuple(self.sightings[i].name for i in which)
         names = list(self._mounts)
         return tuple(names[self.held[i] if len(self.held) else 0] for i in poses)
+
+    @property
+    def owners(self) -> tuple[str, ...]:
+        """Name of the target of each of the k rows; that of the first one where contacts hold targets."""
+        if self._poses.target is None:
+            return (self.first,) * 3
+        return tuple(s.name for s in (*self.sightings, *self._turned) for _ in range(3))
 
     def names_of_turns(self, which: NDArray[np.intp]) -> tuple[str, ...]:
         """Names of the targets of some turns by their places in a pose, shape (t,)."""

@@ -71,7 +71,8 @@ def _with_trackers(robot: Robot, sessions: Sequence[Poses]) -> tuple[Robot, list
         problems = [problem.of_robot(robot) for problem in problems]
     found = [replace(problem, tracker=base_from_tracker(*_known_points(problem))[0]) for problem in problems]
     robot = replace(robot, poses=replace(setup, tracker=found[0].tracker))
-    return robot, [problem.of_robot(robot) for problem in found]
+    own = [replace(problem, own_tracker=not problem.poses.contacts) for problem in found]
+    return robot, [problem.of_robot(robot) for problem in own]
 
 
 def _known_points(problem: PoseSet) -> tuple[Array, Array]:
@@ -99,7 +100,7 @@ def is_open(robot: Robot, owner: str) -> bool:
 
 
 def _with_other_targets(robot: Robot, problems: Sequence[PoseSet]) -> Robot:
-    """Places of further targets on the tool, where they are not known: the mean of what the poses say."""
+    """Places of further targets on the tool, where they are not known: the middle of what the poses say."""
     (_, first), *others = mounts(robot).items()
     values: dict[str, float] = {}
     for name, mount in others:
@@ -113,7 +114,7 @@ def _with_other_targets(robot: Robot, problems: Sequence[PoseSet]) -> Robot:
         seen = np.concatenate(shifts)
         seen = seen[np.isfinite(seen[:, 0])]
         if len(seen):
-            values |= {f"{name}.{part}": float(v) for part, v in zip(LENGTHS, seen.mean(axis=0), strict=True)}
+            values |= {f"{name}.{part}": float(v) for part, v in zip(LENGTHS, np.median(seen, axis=0), strict=True)}
     return robot.with_values(values)
 
 

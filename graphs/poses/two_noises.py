@@ -15,7 +15,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from jointscope.factors.calibration import DYNAMICS, Calibration
+from jointscope.factors.calibration import Calibration
 from jointscope.graphs.poses.pose_set import PoseSet
 
 Array = NDArray[np.float64]
@@ -23,22 +23,22 @@ SMALLEST = 1e-2  # of a step
 
 
 def noise_ratios(
-    problems: Sequence[PoseSet], calibrations: Sequence[Calibration], covariance: Array
+    problems: Sequence[PoseSet], calibrations: Sequence[Calibration], covariances: Sequence[Array]
 ) -> tuple[float, float]:
     """Squared factors on the repeatability and on the noise of orientations; 1 is right.
 
     Args:
         problems: the sessions.
         calibrations: of each.
-        covariance: of all coordinates that were fitted; those of the robot come first.
+        covariances: of all coordinates of each of these.
     """
     squares, shares = np.zeros(2), np.zeros(2)
-    for problem, calibration in zip(problems, calibrations, strict=True):
-        point, index = problem.point(calibration), calibration.columns[DYNAMICS]
+    for problem, calibration, covariance in zip(problems, calibrations, covariances, strict=True):
+        point = problem.point(calibration)
         weights = np.linalg.inv(problem.covariances(point))
-        A = problem.columns(point, calibration)[:, :, index]
+        A = problem.columns(point, calibration)
         used = weights @ A
-        P = weights - used @ covariance[index, index] @ np.swapaxes(used, 1, 2)
+        P = weights - used @ covariance @ np.swapaxes(used, 1, 2)
         pull = np.einsum("mij,mj->mi", weights, problem.misses(point, calibration))
         turns = problem.targets.there & problem.targets.turns
         for k, V in enumerate((point.by_joint * problem.sigmas, turns[:, :, None] * np.eye(turns.shape[1]))):

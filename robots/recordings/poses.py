@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -88,6 +89,23 @@ class Poses:
             others=tuple(other.only(kept) for other in self.others),
             held=tuple(self.held[i] for i in some) if self.held else (),
         )
+
+    def without(self, hidden: Mapping[str, NDArray[np.bool_]], first: str) -> Poses:
+        """The same poses with some targets not seen in some of them.
+
+        Args:
+            hidden: by name of the target, in which poses, shape (m,).
+            first: name of the first target.
+        """
+        seen = [Sighting(first, self.target, self.turn)] if self.target is not None else []
+        kept = {}
+        for s in (*seen, *self.others):
+            out = hidden.get(s.name, np.zeros(len(self), bool))[:, None]
+            turn = None if s.turn is None else np.where(out[:, :, None], np.nan, s.turn)
+            kept[s.name] = Sighting(s.name, np.where(out, np.nan, s.place), turn)
+        main = kept.pop(first, Sighting(first, np.zeros((0, 3))))
+        target = None if self.target is None else main.place
+        return replace(self, target=target, turn=main.turn, others=tuple(kept.values()))
 
     @property
     def of_first(self) -> Poses:

@@ -180,7 +180,11 @@ def pose_json(result: Any) -> dict[str, Any]:
         "rank": result.determined.rank,
         "undetermined": list(result.determined.combinations),
         "repeatability": {j: float(s) for j, s in zip(robot.joints, robot.poses.joint_sigmas, strict=True)},
-        "left_out": [{"path": path, "pose": pose, "sigmas": sigmas} for path, pose, sigmas in result.left_out],
+        "left_out": [
+            {"path": path, "pose": name.removesuffix(f" ({target})"), "sigmas": sigmas}
+            | ({"target": target} if target else {})
+            for (path, name, sigmas), target in zip(result.left_out, result.odd_targets, strict=True)
+        ],
         "poses": [errors.to_json() for errors in result.errors],
         "poses_before": [errors.to_json() for errors in result.before],
         **targets_json(summary(result.errors)),

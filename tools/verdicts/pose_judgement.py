@@ -3,15 +3,18 @@
 
 from __future__ import annotations
 
+from collections import Counter
+
 import numpy as np
-from scipy.special import gammaincc
 
 from jointscope.factors.calibration import Calibration
 from jointscope.graphs.poses.calibrate_poses import PoseCalibration
 from jointscope.graphs.poses.elsewhere import sigma_elsewhere
+from jointscope.graphs.poses.linear_poses import LinearPoses
 from jointscope.graphs.poses.pose_set import PoseSet
 from jointscope.graphs.poses.tip_errors import summary
 from jointscope.graphs.poses.untold_distances import untold_distance
+from jointscope.graphs.poses.what_moved import what_moved
 from jointscope.robots.geometry.error_parameters import BACKLASH
 from jointscope.tools.presentation.numbers import significant
 from jointscope.tools.verdicts.judgement import Check, Judgement
@@ -24,8 +27,6 @@ REPEATS = (3.0, 10.0)  # times the repeatability of the robot file that poses ma
 UNSEEN = 0.05  # of the target's noise: what transmissions make of it at the end of an arm of a METRE is not seen
 METRE = 1.0  # [m]
 SURE = 3.0  # [sigma]
-FEWEST = 4  # poses on each side of a step
-CHANCE = 1e-4  # of a step where there is none
 SHOWN = 4
 OUT = 0.1  # share of the poses that may be left out
 ELSEWHERE = (10.0, 100.0)  # times what is left at the poses that the target may be uncertain in other postures
@@ -42,7 +43,7 @@ def judge_poses(result: PoseCalibration) -> Judgement:
 
 def _enough(result: PoseCalibration) -> Check:
     measured = sum(problem.measured for problem in result.problems)
-    contacts = 3 * sum(len(problem.contacts) for problem in result.problems)
+    contacts = sum(problem.own_coordinates for problem in result.problems)
     values = result.determined.rank + sum(n not in _geometric(result) for n in result.told)
     ratio = (measured - contacts) / max(values, 1)
     level = "good" if ratio >= REDUNDANT[0] else "warn" if ratio >= REDUNDANT[1] else "bad"
@@ -83,41 +84,26 @@ def _solved(result: PoseCalibration) -> list[tuple[PoseSet, Calibration]]:
 
 
 def _outliers(result: PoseCalibration) -> Check:
-    name, out = "Poses that fit", len(result.left_out)
-    total = result.count + out
-    if out <= OUT * total:
-        return Check("good", name, f"{total - out} of {total} poses fit.")
-    text = "look at each before you leave them out for good: targets or readings are wrong, or an effect is missing"
-    return Check("warn", name, f"{out} of {total} poses were left out; {text}.")
+    name, whole = "Poses that fit", result.odd_targets.count("")
+    total, seen = result.count + whole, Counter(summary(result.errors).names)
+    odd = Counter(target for target in result.odd_targets if target)
+    text = f"{total - whole} of {total} poses fit"
+    text += "".join(f", {target} not in {count} of {seen[target] + count}" for target, count in odd.items())
+    shares = [whole / total, *((whole + n) / (seen[target] + whole + n) for target, n in odd.items())]
+    if max(shares) <= OUT:
+        return Check("good", name, f"{text}.")
+    hint = "look at each before you leave them out for good: targets or readings are wrong, or an effect is missing"
+    out = "".join(f", {target} of {count} of {seen[target] + count}" for target, count in odd.items())
+    return Check("warn", name, f"{whole} of {total} poses{out} were left out; {hint}.")
 
 
 def _still(result: PoseCalibration) -> Check:
-    """Whether the tracker stood still: no step in what is left, anywhere in a session."""
-    name, found = "A tracker that stands still", None
-    for problem, errors in zip(result.problems, result.errors, strict=True):
-        vectors = errors.by_pose
-        m = len(vectors)
-        if problem.poses.target is None or m < 2 * FEWEST:
-            continue
-        before = np.cumsum(vectors, axis=0)[FEWEST - 1 : m - FEWEST]
-        k = np.arange(FEWEST, m - FEWEST + 1)[:, None]
-        steps = (vectors.sum(axis=0) - before) / (m - k) - before / k
-        weights = (k * (m - k) / m)[:, 0]
-        falls = weights[:, None] * steps**2
-        best = int(np.argmax(falls.sum(axis=1)))
-        after = np.var(vectors, axis=0) - falls[best] / m
-        score = float(np.sum(falls[best] / np.maximum(after, 1e-300)))
-        if gammaincc(1.5, score / 2.0) * m < CHANCE:
-            jump = 1e3 * float(np.linalg.norm(steps[best]))
-            names, at = [problem.poses.names[i] for i in np.unique(errors.poses)], best + FEWEST
-            found = (
-                f"From pose {names[at]} of {problem.poses.path} on all targets are shifted by {significant(jump, 2)} "
-                f"mm: the tracker, the base or the target was moved; give poses up to {names[at - 1]} and the others "
-                "as two tables, without `tracker` in the robot file"
-            )
-    if found:
-        return Check("bad", name, f"{found}.")
-    return Check("good", name, "The residuals show no step over the session.")
+    """Whether the tracker stood still, and targets on the tool: no step in what is left, anywhere in a session."""
+    name = "A tracker that stands still, and targets that sit fast"
+    step = what_moved(LinearPoses.of(result), result.problems, result.calibrations)
+    if step is None:
+        return Check("good", name, "The residuals show no step over the session.")
+    return Check("bad", name, f"{step.text}.")
 
 
 def _geometric(result: PoseCalibration) -> set[str]:

@@ -133,6 +133,13 @@ def test_an_orientation_that_is_off_takes_its_pose_with_it(tx90l, simulated):
     assert [name for _, name, _ in found.left_out] == ["5"]
 
 
+def test_orientations_that_are_wrong_in_some_poses_are_told_with_these_poses(tx90l, simulated):
+    turn = simulated[0].turn.copy()
+    turn[[4, 8, 21]] = turn[[4, 8, 21]] @ np.diag([-1.0, -1.0, 1.0])
+    with pytest.raises(RecordingError, match=r"orientation of reflector is off by .* in pose 4, 8, 21 and fits in the"):
+        calibrate_poses(tx90l, [replace(simulated[0], turn=turn)])
+
+
 def test_sessions_with_and_without_orientation_go_together(tx90l, simulated):
     other = simulate_poses(tx90l, 20, 3, session="others")[0]
     found = calibrate_poses(tx90l, [simulated[0], other])

@@ -7,16 +7,21 @@ from dataclasses import replace
 from itertools import islice
 
 import numpy as np
+import pinocchio as pin
 import pytest
 from tools_with_targets import tool_with
 
 from jointscope.factors.calibration import DYNAMICS, Calibration
-from jointscope.graphs.poses.calibrate_poses import calibrate_poses
+from jointscope.graphs.poses.calibrate_poses import _estimate, calibrate_poses
+from jointscope.graphs.poses.linear_poses import LinearPoses
 from jointscope.graphs.poses.pose_set import PoseSet
 from jointscope.graphs.poses.tip_errors import tip_errors
 from jointscope.graphs.poses.tracker_start import placed
+from jointscope.graphs.poses.trimmed_poses import with_fitted
+from jointscope.graphs.poses.what_moved import what_moved
 from jointscope.graphs.rests.independent_states import reduced
-from jointscope.robots.errors import RecordingError
+from jointscope.graphs.solving.batch_solver import solve
+from jointscope.robots.errors import RecordingError, SolveError
 from jointscope.robots.files.robot_file import load_robot
 from jointscope.robots.recordings.poses import Poses
 from jointscope.tools.simulator.pose_simulation import PoseConditions, simulate_poses
@@ -145,6 +150,49 @@ def test_the_tracker_is_placed_by_whatever_target_is_known(tmp_path, simulated):
         calibrate_poses(open_robot, [nothing_known])
 
 
+def elsewhere(poses):
+    """What a tracker sees that stands somewhere else."""
+    T = pin.SE3(pin.exp3(np.array([0.3, -0.8, 0.5])), np.array([0.4, -0.2, 0.1]))
+    R, t = T.rotation, T.translation
+    return replace(
+        poses,
+        target=poses.target @ R.T + t,
+        turn=None if poses.turn is None else R @ poses.turn,
+        others=tuple(
+            replace(o, place=o.place @ R.T + t, turn=None if o.turn is None else R @ o.turn) for o in poses.others
+        ),
+    )
+
+
+def test_a_tracker_that_was_moved_between_sessions_is_estimated_with_the_arm(robot, simulated):
+    """The first fit of the nominal arm places it within a tenth of a millimetre only."""
+    open_robot = replace(robot, poses=replace(robot.poses, tracker=None, tracker_link=None))
+    other = elsewhere(simulate_poses(robot, 30, 3, PoseConditions(orientation=True), session="others")[0])
+    found = calibrate_poses(open_robot, [simulated[0], other])
+    assert [problem.own_tracker for problem in found.problems] == [True, True]
+    assert len(found.left_out) < 3 and found.repeatability < 1.5
+    assert all(errors.to_json()["rms_mm"] < 0.06 for errors in found.errors)
+    truth = simulated[1]["parameters"]
+    for name in ("left.lx", "right.ly", *WRIST):
+        p = found.robot.parameters[name]
+        assert abs(p.value - truth[name]) < 3.5 * p.sigma, name
+
+
+def test_derivatives_by_the_pose_of_a_tracker_are_those_of_what_is_missed(robot, oriented):
+    open_robot = replace(robot, poses=replace(robot.poses, tracker=None, tracker_link=None))
+    open_robot, (_, problem) = placed(open_robot, [oriented, elsewhere(with_holes(oriented))])
+    _, calibration = problem.start(Calibration.of(open_robot))
+    J = problem.columns(problem.point(calibration), calibration)[:, :, calibration.columns["tracker_pose"]]
+
+    def missed(step):
+        at = calibration.retract({"tracker_pose": step})
+        return problem.misses(problem.point(at), at)
+
+    for i in range(6):
+        d = 1e-6 * np.eye(6)[i]
+        np.testing.assert_allclose(J[:, :, i], (missed(d) - missed(-d)) / 2e-6, atol=1e-6)
+
+
 def test_one_target_alone_is_computed_as_ever(robot, simulated):
     """To the last bit: a robot with further targets and poses that show the first one only, and the ready robot."""
     alone = replace(simulated[0], others=())
@@ -191,12 +239,96 @@ def test_a_target_in_another_place_on_the_tool_is_told_with_the_place(tmp_path, 
         calibrate_poses(wrong, [replace(simulated[0], others=simulated[0].others[:1])])
 
 
-def test_a_target_that_a_reflection_moved_is_left_out_with_its_pose(robot, simulated):
+@pytest.mark.parametrize("size", [1e-3, 3e-3])
+def test_a_target_that_a_reflection_moved_is_left_out_alone(robot, simulated, size):
     left, right = simulated[0].others
     place = left.place.copy()
-    place[11] += [0.0, 3e-3, 0.0]
+    place[[4, 11]] += [0.0, size, 0.0]
     found = calibrate_poses(robot, [replace(simulated[0], others=(replace(left, place=place), right))])
-    assert [name for _, name, _ in found.left_out] == ["11"]
+    assert sorted(name for _, name, _ in found.left_out) == ["11 (left)", "4 (left)"]
+    assert found.count == 30 and found.problems[0].measured == 3 * (90 - 2)
+    truth = simulated[1]["parameters"]
+    for name in ("left.lx", "left.ly", *WRIST):
+        assert abs(found.robot.parameters[name].value - truth[name]) < 3.5 * found.robot.parameters[name].sigma, name
+
+
+def test_angles_that_are_off_take_the_whole_pose_with_them(robot, simulated):
+    q = simulated[0].q.copy()
+    q[11, 1] += 3e-3
+    assert [name for _, name, _ in calibrate_poses(robot, [replace(simulated[0], q=q)]).left_out] == ["11"]
+
+
+def test_a_target_that_comes_loose_is_named_as_the_one(robot, simulated):
+    left, right = simulated[0].others
+    place = left.place + 2e-3 * np.random.default_rng(1).standard_normal((30, 3))
+    with pytest.raises(
+        SolveError, match=r"left does not fit in .* of the 30 poses that show it, while other targets do, as"
+    ):
+        calibrate_poses(robot, [replace(simulated[0], others=(replace(left, place=place), right))])
+
+
+def test_targets_that_are_wrong_in_some_poses_are_told_with_these_poses(robot, simulated):
+    poses = simulated[0]
+    left, right = poses.others
+    some = np.isin(np.arange(30), [3, 9, 20])[:, None]
+    exchanged = replace(
+        poses,
+        target=np.where(some, left.place, poses.target),
+        others=(replace(left, place=np.where(some, poses.target, left.place)), right),
+    )
+    with pytest.raises(RecordingError, match="targets reflector and left seem to be exchanged in pose 3, 9, 20: the"):
+        calibrate_poses(robot, [exchanged])
+    for k, other in enumerate((left, right)):
+        far = replace(other, place=other.place + 0.6 * (np.arange(30) == 7)[:, None])
+        others = (far, right) if k == 0 else (left, far)
+        with pytest.raises(RecordingError, match=f"target {other.name} is off by up to .* mm in pose 7 and fits in"):
+            calibrate_poses(robot, [replace(poses, others=others)])
+        milli = (
+            (replace(left, place=1e3 * left.place), right)
+            if k == 0
+            else (left, replace(right, place=1e3 * right.place))
+        )
+        with pytest.raises(RecordingError, match=f"places of {other.name} are about 1000 times as far apart as those"):
+            calibrate_poses(robot, [replace(poses, others=milli)])
+
+
+@pytest.mark.parametrize("size", [3e-4, 1e-3])
+def test_a_target_that_slips_on_the_tool_is_named_with_the_pose_from_which_on(robot, simulated, size):
+    """Its shift on the tool, in axes that the kinematics of pinocchio turn."""
+    poses = simulated[0]
+    R, late = robot.tree.body_poses("reflector", poses.q)[0], np.arange(30) >= 13
+    left, right = poses.others
+    slipped = replace(left, place=left.place + late[:, None] * (R @ [0.6 * size, 0.0, 0.8 * size]))
+    step = step_of(robot, replace(poses, others=(slipped, right)))
+    assert (step.target, step.turned, step.before, step.after) == ("left", False, "12", "13")
+    assert abs(step.size - size) < 0.2 * size
+
+
+def test_a_target_that_turns_on_the_tool_is_named_and_so_is_a_tracker_that_moves(robot):
+    poses = simulate_poses(robot, 30, 3, PoseConditions(orientation=True))[0]
+    left, right = poses.others
+    late = (np.arange(30) >= 13)[:, None, None]
+    turned = replace(left, turn=np.where(late, left.turn @ pin.exp3(np.array([0.0, 2e-3, 0.0])), left.turn))
+    step = step_of(robot, replace(poses, others=(turned, right)))
+    assert (step.target, step.turned, step.after) == ("left", True, "13") and abs(step.size - 2e-3) < 4e-4
+    shift = late[:, 0] * np.array([3e-4, 0.0, 4e-4])
+    others = tuple(replace(other, place=other.place + shift) for other in poses.others)
+    step = step_of(robot, replace(poses, target=poses.target + shift, others=others))
+    assert (step.target, step.after) == ("", "13") and abs(step.size - 5e-4) < 1e-4
+    assert step_of(robot, poses) is None
+
+
+def step_of(robot, poses):
+    """What moved, as a calibration from these poses or its refusal says."""
+    try:
+        found = calibrate_poses(robot, [poses])
+    except SolveError as err:
+        robot, problems = placed(robot, [poses])
+        known = solve(problems, _estimate(problems, ()), max_iterations=400, progress=None).estimate.calibrations
+        step = what_moved(LinearPoses.at(with_fitted(robot, known), problems, known), problems, known)
+        assert step.text in str(err)
+        return step
+    return what_moved(LinearPoses.of(found), found.problems, found.calibrations)
 
 
 def test_balls_in_sockets_may_be_several_and_each_is_found_on_the_tool(tmp_path):

@@ -76,6 +76,8 @@ def poses_from_bag(path: Path, robot: Robot) -> Poses:
             f"{path}: {counted(len(rests), 'rest')} of all joints, none with a target in {setup.positions.topic}; "
             f"expected "
             "poses of half a second or more in which the tracker sees the target"
+            + f"; in {moving} of them it moved by more than {1e3 * STEADY:g} mm, or its noise is that large"
+            * bool(moving)
         )
     notices = []
     if moving:
@@ -87,6 +89,9 @@ def poses_from_bag(path: Path, robot: Robot) -> Poses:
     qs, means, torques = (np.array(part) for part in zip(*found, strict=True))
     names, sightings = tuple(str(i) for i in range(len(qs))), list[Sighting]()
     for i, track in enumerate(tracks):
+        if not np.any(np.isfinite(means[:, i, 0])):
+            text = f"poses: {path}: the target {track.name} was seen in no rest, fewer than {FEWEST} messages in each"
+            notices.append(Notice("poses", "info", 0, text))
         turned = orientations(path, means[:, i, 3:], [f"pose {name}" for name in names], track.name)
         notices += turned.notices
         sightings.append(Sighting(track.name, means[:, i, :3], turned.turns))
