@@ -497,3 +497,7 @@ def test_joints_at_rest_do_not_move_by_a_second_node_that_publishes_zeros(arm, h
     assert len(recording.streams["motor_encoder"].values) == len(held.times)
     said = [notice.text for notice in recording.notices if notice.kind == "foreign"]
     assert any(f"left out {len(range(3, len(held.times), 3))} messages" in text for text in said)
+    reader = ArrivalReader(bag, robot)
+    (block,) = list(reader)
+    assert len(block) == recording.sample_count
+    assert any(f"left out {len(range(3, len(held.times), 3))} messages" in text for text in reader.notices())
