@@ -56,6 +56,7 @@ def test_random_torques_of_a_robot_are_parts_of_what_its_drives_give(doggy):
 
 @pytest.mark.parametrize(("adequate", "begins"), [(True, "the model is adequate: no more than "), (False, "nothing")])
 def test_where_torques_judge_the_end_of_a_search_says_how_much_of_them_is_missing(adequate, begins):
-    diagnosis = SimpleNamespace(adequate=adequate, missing_torque_percent={"j1": 0.2, "j2": 0.94}, unexplained_share=0.0)
+    percent = {"j1": 0.2, "j2": 0.94}
+    diagnosis = SimpleNamespace(adequate=adequate, missing_torque_percent=percent, unexplained_share=0.0)
     said = why_it_stopped(diagnosis)
     assert said.startswith(begins) and "0.94 % of the drive's torque is missing at j2" in said
