@@ -115,8 +115,13 @@ def did_not_hold(refused: Mapping[str, str]) -> str:
 
 def why_it_stopped(diagnosis: Diagnosis) -> str:
     """Why a search stopped with the last diagnosis."""
-    if diagnosis.adequate and diagnosis.missing_torque_percent is not None:
-        return "the model is adequate: no effect of the catalogue and no smooth law explain more of the missing torque"
+    if diagnosis.missing_torque_percent is not None:
+        joint, percent = max(diagnosis.missing_torque_percent.items(), key=lambda item: item[1])
+        lacks = f"{percent:.2g} % of the drive's torque is missing at {joint}"
+        if diagnosis.adequate:
+            return f"the model is adequate: no more than {lacks}, of which no effect and no smooth law explain more"
+        part = part_in_words(diagnosis.unexplained_share)
+        return f"nothing in the catalogue explains the rest: {lacks}, of whose square smooth laws would explain {part}"
     if diagnosis.adequate:
         return "the model is adequate: no effect of the catalogue is missing, and the error is at its floor"
     part = part_in_words(diagnosis.unexplained_share)

@@ -19,6 +19,7 @@ from jointscope.graphs.discovery.diagnosis_words import did_not_hold, rises_else
 from jointscope.graphs.discovery.discovery_result import Discovery, DiscoveryStep, SavedStep, with_lasting_floors
 from jointscope.graphs.discovery.search_kind import Errors, Kind, Motion
 from jointscope.graphs.discovery.side_by_side import SideBySide
+from jointscope.graphs.discovery.spring_trials import kept_by_predictions
 from jointscope.graphs.discovery.starting_model import turns_over_sharper
 from jointscope.graphs.discovery.unexplained import unexplained
 from jointscope.graphs.discovery.verdicts import MATTERS, SAME, SURE
@@ -128,7 +129,7 @@ class _Search:
             barred, now = frozenset(refused), self.steps[-1].comparison
             diagnosis = self.kind.diagnosed(base, now, self.last_errors, self._part(share), barred)
             self._attach(diagnosis)
-            if trial is not None and _torque_fell(trial.diagnosis, diagnosis):
+            if trial is not None and (_torque_fell(trial.diagnosis, diagnosis) or self._predicts(trial)):
                 refused = {}
             elif trial is not None:
                 self._take_back(trial)
@@ -180,6 +181,9 @@ class _Search:
         paragraph = what_came_in(candidate, grown.robot, before, errors.error)
         self._add_step(candidate.label, None, grown, f"{paragraph}{HELD if held else ''}", errors)
         return grown
+
+    def _predicts(self, trial: _Trial) -> bool:
+        return kept_by_predictions(trial.candidate, trial.step.train_error, self.steps[-1].train_error)
 
     def _without_idle(self, base: Any) -> Any:
         """Takes out effects whose sizes fell back to null after another one came in."""

@@ -90,7 +90,9 @@ class SpringTrials:
     ) -> tuple[list[Candidate], dict[str, Robot]]:
         """All candidates with the verdicts on springs, and the robots with those.
 
-        A clear spring that explains more than the first other one comes first.
+        A clear spring that explains more than the first other one comes first. A stiff one takes little torque,
+        averaged over many steps, and is yet most of what fine encoders see: where nothing else is missing they ask for
+        a trial.
 
         Args:
             candidates: judged by other means, best first.
@@ -98,7 +100,12 @@ class SpringTrials:
             torques: robots with the effects that missing torque names.
             missing: torque of each joint in percent of the drive's; empty where predictions are judged.
         """
-        tried = {f"{SPRING}@{joint}": self._fitted(joint) for joint in self._far(missing)}
+        far = self._far(missing)
+        if missing and not far and not any(c.verdict == "missing" for c in candidates):
+            far = self._far({})
+        springs = [c for c in candidates if c.effect == SPRING]
+        starts = {c.owner: {name: p.value for name, p in c.parameters.items()} for c in springs}
+        tried = {f"{SPRING}@{joint}": self._fitted(joint, starts.get(joint)) for joint in far}
         if not tried:
             return list(candidates), {}
         seconds = judged_seconds(self.base, self.spans[1])
@@ -149,14 +156,15 @@ class SpringTrials:
         grown = add_effect(self.base.result.start, label, dict(start or {}))
         return BaseModel.of(grown, self.base.recordings, by_torques=self.base.by_torques)
 
-    def _fitted(self, joint: str) -> ValidatedRefit | None:
+    def _fitted(self, joint: str, start: Mapping[str, float] | None) -> ValidatedRefit | None:
         """The model with a spring; None where it cannot be calibrated.
 
-        It is calibrated from the start values: the rotor of the rigid model moves the link, too.
+        It is calibrated from the start values: the rotor of the rigid model moves the link, too. Its own are what
+        missing torque tells of it, if that is something; far from a stiff spring there are other minima.
         """
         label = f"{SPRING}@{joint}"
         try:
-            elastic = self._elastic(label)
+            elastic = self._elastic(label, start)
             return refit_and_validate(elastic, self.spans, label=label, holdout=self.holdout)
         except (JointscopeError, np.linalg.LinAlgError):
             return None
@@ -172,6 +180,17 @@ class SpringTrials:
             return refit_and_validate(grown, self.spans, label=first.label).validation.error
         except (JointscopeError, np.linalg.LinAlgError):
             return float("inf")
+
+
+def kept_by_predictions(candidate: Candidate, before: float, after: float) -> bool:
+    """Whether a spring explains most of what predictions lack, how little torque it may take.
+
+    Args:
+        candidate: that was added.
+        before: training error without it [sigma].
+        after: the same with it.
+    """
+    return candidate.effect == SPRING and after**2 < (1.0 - CLEAR) * before**2
 
 
 def _doubted(spring: Candidate) -> Candidate:

@@ -8,8 +8,10 @@ that moves without being modelled makes every result wrong, so it is an error.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from jointscope.robots.errors import RecordingError
 from jointscope.robots.model.command_words import init_command
@@ -18,6 +20,9 @@ from jointscope.robots.recordings.recording import Notice
 from jointscope.robots.units import si_factor, si_unit
 from jointscope.tools.bags.messages.message_parts import MessageParts
 from jointscope.tools.bags.tidying.not_finite import LARGEST
+from jointscope.tools.bags.tidying.second_publisher import of_second_publisher
+
+Array = NDArray[np.float64]
 
 STILL = {"rad": 0.03, "m": 0.005}  # a joint that spans less is held; its weight then moves as little
 OUTLYING = 0.005  # share of the samples on either side that does not count: glitches, foreign messages
@@ -36,6 +41,7 @@ def held_posture(found: Sequence[MessageParts], robot: Robot, bag: str) -> tuple
     Raises:
         RecordingError: one of them moves.
     """
+    found = [of_drivers(parts) for parts in found]
     names = _other_names(found, robot)
     at_mean = robot.held_at_mean
     ranges = {
@@ -73,6 +79,19 @@ def held_posture(found: Sequence[MessageParts], robot: Robot, bag: str) -> tuple
     return middle, notices
 
 
+def of_drivers(found: MessageParts) -> MessageParts:
+    """The messages without those of a second node that always says the same: a joint at rest jumps by them.
+
+    The joints that move tell which ones they are.
+    """
+    kept = []
+    for part in found.parts:
+        sound = part.values[:, np.all(np.abs(part.values) < LARGEST, axis=0)]
+        foreign = of_second_publisher(sound) if sound.size else np.zeros(len(part.values), bool)
+        kept.append(part.take(np.flatnonzero(~foreign)) if foreign.any() else part)
+    return replace(found, parts=tuple(kept))
+
+
 def _other_names(found: Sequence[MessageParts], robot: Robot) -> dict[str, str]:
     """Names in the messages that are not the robot's, and the joint of the URDF that each stands for."""
     own = robot.motor_encoder.source.names
@@ -84,20 +103,26 @@ def _other_names(found: Sequence[MessageParts], robot: Robot) -> dict[str, str]:
 
 def _range(found: Sequence[MessageParts], name: str, mean: bool) -> tuple[float, float, float] | None:
     """Smallest, middle (or mean) and largest value of a name, without outliers; None where there are too few."""
-    values = [
-        part.values[:, part.names.index(name)]
-        for parts in found
-        for part in parts.parts
-        if part.names and name in part.names and len(part.names) == part.values.shape[1]
-    ]
-    every = np.concatenate(values) if values else np.empty(0)
-    every = every[np.abs(every) < LARGEST]
+    every = np.concatenate([_values_of(parts, name) for parts in found])
     if len(every) < FEWEST:
         return None
     low, middle, high = np.quantile(every, [OUTLYING, 0.5, 1.0 - OUTLYING])
     if mean:
         middle = np.mean(every[(every >= low) & (every <= high)])
     return float(low), float(middle), float(high)
+
+
+def _values_of(found: MessageParts, name: str) -> Array:
+    """What messages of all sizes say of a name, in the order of the bag, without a node that repeats itself."""
+    rows, values = [np.empty(0, np.intp)], [np.empty(0)]
+    for part in found.parts:
+        names = part.names or ()
+        if name in names and len(names) == part.values.shape[1]:
+            rows.append(np.arange(len(part.values)) if part.rows is None else part.rows)
+            values.append(part.values[:, names.index(name)])
+    every = np.concatenate(values)[np.argsort(np.concatenate(rows), kind="stable")]
+    every = every[np.abs(every) < LARGEST]
+    return every[~of_second_publisher(every[:, None])]
 
 
 def unit_of_other(robot: Robot, joint: str) -> str:

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from jointscope.robots.model.robot import Robot
 from jointscope.robots.recordings.recording import Notice
 from jointscope.robots.units import si_factor
-from jointscope.tools.bags.held_posture import FEWEST, OUTLYING, STILL, unit_of_other
+from jointscope.tools.bags.held_posture import FEWEST, OUTLYING, STILL, of_drivers, unit_of_other
 from jointscope.tools.bags.messages.message_parts import MessageParts
 from jointscope.tools.bags.tidying.not_finite import LARGEST
 
@@ -31,6 +31,7 @@ def mimic_notices(found: Sequence[MessageParts], robot: Robot) -> list[Notice]:
         robot: its tree says what follows what.
     """
     source, notices = robot.motor_encoder.source, list[Notice]()
+    found = [of_drivers(parts) for parts in found] if robot.tree.followers else []
     names = dict(zip(robot.joints, source.names or robot.joints, strict=True))
     units = dict(zip(robot.joints, source.bag_units(robot.n), strict=True))
     scales = dict(zip(robot.joints, np.broadcast_to(source.scale, robot.n), strict=True))

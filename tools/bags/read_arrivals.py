@@ -40,6 +40,8 @@ from jointscope.tools.bags.needed_streams import (
     wanted_of,
 )
 from jointscope.tools.bags.tidying.late_copies import late_copies
+from jointscope.tools.bags.tidying.second_publisher import of_second_publisher
+from jointscope.tools.bags.tidying.tidy_samples import FEWEST
 
 Array = NDArray[np.float64]
 
@@ -206,15 +208,18 @@ class ArrivalReader:
         return self._own(need, topic, self._filled(need, self._on_time(need, topic, columns)))
 
     def _own(self, need: StreamSource, topic: RawTopic, columns: Columns) -> Columns:
-        """The messages without those that a second node repeats later."""
+        """The messages without those of a second node, which repeats the driver's later, or itself among a sensor's."""
         stamps = columns.of(topic.received_ns) if columns.stamps is None else columns.stamps
-        order = np.argsort(stamps, kind="stable")
-        copies = np.zeros(len(order), bool)
-        copies[order] = late_copies(stamps[order], columns.values[order])
-        if not copies.any():
+        order, foreign = np.argsort(stamps, kind="stable"), np.zeros(len(stamps), bool)
+        foreign[order] = late_copies(stamps[order], columns.values[order])
+        what = "of a second node that repeats those of the driver later"
+        if not foreign.any() and need.name != "command" and len(order) >= FEWEST and columns.absent is None:
+            foreign[order] = of_second_publisher(columns.values[order])
+            what = "of a second node that publishes always the same"
+        if not foreign.any():
             return columns
-        self._left_out[need.name, "of a second node that repeats those of the driver later"] += int(copies.sum())
-        return columns.take(~copies)
+        self._left_out[need.name, what] += int(foreign.sum())
+        return columns.take(~foreign)
 
     def _filled(self, need: StreamSource, columns: Columns) -> Columns:
         """The messages whose stamps are filled."""

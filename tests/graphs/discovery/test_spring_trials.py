@@ -13,7 +13,7 @@ import pytest
 from jointscope.graphs.discovery import spring_trials
 from jointscope.graphs.discovery.diagnose import diagnose
 from jointscope.graphs.discovery.diagnosis_result import Candidate
-from jointscope.graphs.discovery.spring_trials import SpringTrials
+from jointscope.graphs.discovery.spring_trials import SpringTrials, kept_by_predictions
 from jointscope.graphs.refits.validation import ValidationError
 from jointscope.robots.files.robot_file import load_robot
 from jointscope.tools.bags.read_recording import read_recording
@@ -41,19 +41,19 @@ def candidate(effect, verdict, error=float("nan"), share=0.9):
     return Candidate(effect, "j1", 1.0, 1, 0.0, {}, verdict, share, validation_error=error)
 
 
-def trials(monkeypatch, spring, rival=float("inf"), missing=50.0):
+def trials(monkeypatch, spring, rival=float("inf"), missing=50.0, verdict="missing"):
     """What is found beside a torque that explains something, where the spring was judged so."""
     robot = SimpleNamespace(sensors={"e": 1}, transmission=None, choices=SimpleNamespace(link_dynamics="model"))
     robot.joints, robot.motor_encoder = ("j1", "j2"), SimpleNamespace(channels=("j1.p", "j2.p"))
     monkeypatch.setattr(spring_trials, "catalogue", lambda: {spring_trials.SPRING: Owners()})
     monkeypatch.setattr(spring_trials, "judge", lambda *_: spring)
     fitted = SimpleNamespace(refit=SimpleNamespace(robot="elastic"))
-    monkeypatch.setattr(SpringTrials, "_fitted", lambda self, joint: fitted)
+    monkeypatch.setattr(SpringTrials, "_fitted", lambda self, joint, start: fitted)
     monkeypatch.setattr(SpringTrials, "_rival", lambda *_: rival)
     before = ValidationError(100.0, 10.0, np.array([100.0]), {"j1.p": 100.0, "j2.p": 1.0})
     tried = SpringTrials(SimpleNamespace(robot=robot), ((), ()), before, None)
     scored = SimpleNamespace(candidates=[candidate("joint_elasticity", "absent"), candidate("cogging", "absent")])
-    torque = candidate("torque_offset", "missing")
+    torque = candidate("torque_offset", verdict)
     return tried.beside([torque], scored, {}, {"j1": missing, "j2": 1.0})
 
 
@@ -81,3 +81,17 @@ def test_other_springs_are_possible_at_most(monkeypatch, share, rival):
 def test_joints_that_are_nearly_explained_are_not_tried(monkeypatch):
     found, refits = trials(monkeypatch, candidate("joint_elasticity", "missing", 2.0), missing=9.0)
     assert [c.effect for c in found] == ["torque_offset"] and not refits
+
+
+def test_a_stiff_spring_that_takes_little_torque_is_tried_where_nothing_else_is_missing(monkeypatch):
+    found, refits = trials(monkeypatch, candidate("joint_elasticity", "missing", 2.0), missing=0.2, verdict="absent")
+    assert [(c.effect, c.verdict) for c in found] == [("joint_elasticity", "missing"), ("torque_offset", "absent")]
+    assert refits == {"joint_elasticity@j1": "elastic"}
+
+
+@pytest.mark.parametrize(
+    ("effect", "after", "kept"),
+    [("joint_elasticity", 19.0, True), ("joint_elasticity", 90.0, False), ("torque_offset", 19.0, False)],
+)
+def test_predictions_keep_springs_that_explain_most_of_their_error_and_nothing_else(effect, after, kept):
+    assert kept_by_predictions(candidate(effect, "missing"), 101.0, after) is kept

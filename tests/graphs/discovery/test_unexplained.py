@@ -8,6 +8,7 @@ from types import SimpleNamespace
 import pytest
 
 from jointscope.graphs.discovery import unexplained as module
+from jointscope.graphs.discovery.diagnosis_words import why_it_stopped
 from jointscope.graphs.discovery.unexplained import believed_floor, unexplained, unexplained_share
 
 RECORDING = SimpleNamespace()
@@ -51,3 +52,11 @@ def test_random_torques_of_a_robot_are_parts_of_what_its_drives_give(doggy):
     half, full = module.random_torque(doggy, used(0.5)), module.random_torque(doggy, used(1.0))
     assert half == pytest.approx(2.0 * full)
     assert module.random_torque(doggy, used(0.0)) == float("inf")
+
+
+@pytest.mark.parametrize(("adequate", "begins"), [(True, "the model is adequate: no more than "), (False, "nothing")])
+def test_where_torques_judge_the_end_of_a_search_says_how_much_of_them_is_missing(adequate, begins):
+    percent = {"j1": 0.2, "j2": 0.94}
+    diagnosis = SimpleNamespace(adequate=adequate, missing_torque_percent=percent, unexplained_share=0.0)
+    said = why_it_stopped(diagnosis)
+    assert said.startswith(begins) and "0.94 % of the drive's torque is missing at j2" in said

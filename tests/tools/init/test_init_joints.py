@@ -472,3 +472,32 @@ def test_strange_names_are_matched_with_those_of_the_encoders(arm, free, tmp_pat
     expected = tuple(strange[joint] for joint in robot.joints)
     assert robot.motor_encoder.source.names == expected
     assert robot.command.names == expected
+
+
+@pytest.mark.parametrize("alone", [False, True], ids=["of all joints", "of the joint at rest"])
+def test_joints_at_rest_do_not_move_by_a_second_node_that_publishes_zeros(arm, held, alone, tmp_path, capsys):
+    zeros = held.states()
+    zeros["position"] = np.zeros_like(zeros["position"])
+    if alone:
+        zeros |= {"names": ["wrist"], "position": zeros["position"][:, :1]}
+    zeros |= {"rows": range(3, len(held.times), 3), "stamped": lambda stamp: stamp + 300_000}
+    topics = {
+        "/joint_states": held.states(),
+        "/joint_states#zeros": zeros,
+        "/motor_command": held.commands(("shoulder", "elbow")),
+    }
+    bag = write_arm_bag(tmp_path / "a.mcap", held.times, topics)
+    assert init(arm, bag, "-o", tmp_path / "a.yaml") == 0
+    assert "the recording can be used with it" in capsys.readouterr().out
+    robot = load_robot(tmp_path / "a.yaml")
+    assert robot.joints == ("shoulder", "elbow")
+    assert robot.tree.locked == {"wrist": pytest.approx(-1.019, abs=1e-4)}
+    recording = read_recording(bag, robot)
+    assert recording.posture == {"wrist": pytest.approx(-1.019, abs=1e-4)}
+    assert len(recording.streams["motor_encoder"].values) == len(held.times)
+    said = [notice.text for notice in recording.notices if notice.kind == "foreign"]
+    assert any(f"left out {len(range(3, len(held.times), 3))} messages" in text for text in said)
+    reader = ArrivalReader(bag, robot)
+    (block,) = list(reader)
+    assert len(block) == recording.sample_count
+    assert any(f"left out {len(range(3, len(held.times), 3))} messages" in text for text in reader.notices())

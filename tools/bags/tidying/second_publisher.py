@@ -38,12 +38,7 @@ def without_second_publisher(
     Raises:
         RecordingError: two nodes publish, and nothing tells which of them is right.
     """
-    _, which, counts = np.unique(samples.values, axis=0, return_inverse=True, return_counts=True)
-    which = which.reshape(-1)
-    foreign = np.zeros(len(samples), bool)
-    for value in np.argsort(-counts)[:LOOKED_AT]:
-        if counts[value] >= FEWEST and _comes_and_goes(samples.values, which == value):
-            foreign |= which == value
+    foreign = of_second_publisher(samples.values)
     count = int(np.count_nonzero(foreign))
     kept, notices = samples.take(~foreign), []
     if count:
@@ -55,6 +50,21 @@ def without_second_publisher(
         notices.append(Notice(name, "foreign", count, text))
     _refuse_mixed(name, channels, kept)
     return kept, notices
+
+
+def of_second_publisher(values: NDArray[np.float64]) -> NDArray[np.bool_]:
+    """Which samples are those of a node that repeats itself, shape (n,).
+
+    Args:
+        values: in the order of their stamps, finite, shape (n, m).
+    """
+    _, which, counts = np.unique(values, axis=0, return_inverse=True, return_counts=True)
+    which = which.reshape(-1)
+    foreign = np.zeros(len(values), bool)
+    for value in np.argsort(-counts)[:LOOKED_AT]:
+        if counts[value] >= FEWEST and _comes_and_goes(values, which == value):
+            foreign |= which == value
+    return foreign
 
 
 def _comes_and_goes(values: NDArray[np.float64], is_it: NDArray[np.bool_]) -> bool:
