@@ -213,7 +213,7 @@ def judged(case: Case, found: ArmDiscovery) -> dict[str, Any]:
     first = labels[:1] == wanted[:1] or alike
     if case.outlier:
         last = found.steps[-1].calibrated.poses
-        out = [] if last is None else [name for _, name, _ in last.left_out]
+        out = [] if last is None else [each.name for each in last.left_out]
         first = first and out == [str(OUTLIER)]
     sizes = {name: _away(found.robot, name, true) for name, true in case.sizes.items()}
     held = all(away is None or abs(away["sigmas"]) < 3.0 for away in sizes.values())

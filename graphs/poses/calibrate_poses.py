@@ -69,9 +69,7 @@ class PoseCalibration:
         determined: which geometric errors these poses tell apart.
         repeatability: factor on the sigmas of the joints that the robot file had.
         chi2: of the residuals per degree of freedom.
-        left_out: path, name of the pose and its distance in sigmas; the name of a target that alone was left out is
-            behind that of the pose.
-        odd_targets: of each of these the target that alone was left out; empty where the whole pose was.
+        left_out: poses, or targets of them, that fit nothing.
         iterations: of all passes.
         wall_seconds: of the whole.
     """
@@ -87,8 +85,7 @@ class PoseCalibration:
     determined: Determined
     repeatability: float
     chi2: float
-    left_out: tuple[tuple[str, str, float], ...]
-    odd_targets: tuple[str, ...]
+    left_out: tuple[Outlier, ...]
     iterations: int
     wall_seconds: float
 
@@ -280,7 +277,7 @@ def _result(
     errors = tuple(tip_errors(problem, c) for problem, c in zip(problems, calibrations, strict=True))
     return PoseCalibration(
         found, robot, tuple(problems), tuple(calibrations), first.names, own, errors, before, told, scale, ratio,
-        tuple((o.path, o.name, o.sigmas) for o in out), tuple(o.target for o in out), iterations, seconds,
+        tuple(out), iterations, seconds,
     )  # fmt: skip
 
 

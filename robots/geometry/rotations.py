@@ -1,11 +1,16 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Many rotations at once: of quaternions, as rotation vectors, their mean, and how far they are from it."""
+"""Many rotations at once: of quaternions, as rotation vectors, their mean, and how far they are from it.
+
+Those that are not there are NaN and stay so, which the rotations of scipy do not take.
+"""
 
 from __future__ import annotations
 
 import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
+
+from jointscope.robots.bodies.body_rates import skew
 
 Array = NDArray[np.float64]
 SMALL = 1e-4  # [rad] below which a series is nearer than the formula
@@ -47,9 +52,7 @@ def log_slopes(r: Array) -> Array:
     """
     t = np.maximum(np.linalg.norm(r, axis=1), SMALL)
     factor = 1.0 / t**2 - (1.0 + np.cos(t)) / (2.0 * t * np.sin(t))
-    K = np.zeros((len(r), 3, 3))
-    K[:, 2, 1], K[:, 0, 2], K[:, 1, 0] = r[:, 0], r[:, 1], r[:, 2]
-    K = K - np.swapaxes(K, 1, 2)
+    K = skew(r)
     return np.asarray(np.eye(3) - 0.5 * K + factor[:, None, None] * (K @ K))
 
 

@@ -65,8 +65,8 @@ def _verdict(result: PoseCalibration) -> Section:
     judgement = judge_poses(result)
     items = "".join(f"<li><b>{escape(check.name)}</b>: {escape(check.text)}</li>" for check in judgement.checks)
     out = "".join(
-        f"<li>pose {escape(name)} of {escape(path)} was left out: {size:.0f} sigma away</li>"
-        for path, name, size in result.left_out
+        f"<li>pose {escape(each.name)} of {escape(each.path)} was left out: {each.sigmas:.0f} sigma away</li>"
+        for each in result.left_out
     )
     return Section("verdict", "Is it good?", f"<ul>{items}{out}</ul>", judgement.headline)
 

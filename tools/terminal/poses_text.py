@@ -58,7 +58,8 @@ def _verdict(result: PoseCalibration) -> str:
     lines += [f"  - {check.text}" for check in judgement.checks if check.level in ("good", "info")]
     lines += [f"  - {notice.text}" for problem in result.problems for notice in problem.poses.notices]
     if result.left_out:
-        said = ", ".join(f"{name} of {path} ({size:.0f} sigma)" for path, name, size in result.left_out[:SHOWN_OUT])
+        first = result.left_out[:SHOWN_OUT]
+        said = ", ".join(f"{each.name} of {each.path} ({each.sigmas:.0f} sigma)" for each in first)
         more = f" and {len(result.left_out) - SHOWN_OUT} more" if len(result.left_out) > SHOWN_OUT else ""
         lines.append(f"  - left out as outliers: pose {said}{more}")
     return "\n".join(lines)

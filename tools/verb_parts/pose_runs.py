@@ -181,9 +181,9 @@ def pose_json(result: Any) -> dict[str, Any]:
         "undetermined": list(result.determined.combinations),
         "repeatability": {j: float(s) for j, s in zip(robot.joints, robot.poses.joint_sigmas, strict=True)},
         "left_out": [
-            {"path": path, "pose": name.removesuffix(f" ({target})"), "sigmas": sigmas}
-            | ({"target": target} if target else {})
-            for (path, name, sigmas), target in zip(result.left_out, result.odd_targets, strict=True)
+            {"path": each.path, "pose": each.pose, "sigmas": each.sigmas}
+            | ({"target": each.target} if each.target else {})
+            for each in result.left_out
         ],
         "poses": [errors.to_json() for errors in result.errors],
         "poses_before": [errors.to_json() for errors in result.before],

@@ -84,9 +84,9 @@ def _solved(result: PoseCalibration) -> list[tuple[PoseSet, Calibration]]:
 
 
 def _outliers(result: PoseCalibration) -> Check:
-    name, whole = "Poses that fit", result.odd_targets.count("")
+    name, targets = "Poses that fit", Counter(each.target for each in result.left_out)
+    whole, odd = targets[""], {target: count for target, count in targets.items() if target}
     total, seen = result.count + whole, Counter(summary(result.errors).names)
-    odd = Counter(target for target in result.odd_targets if target)
     text = f"{total - whole} of {total} poses fit"
     text += "".join(f", {target} not in {count} of {seen[target] + count}" for target, count in odd.items())
     shares = [whole / total, *((whole + n) / (seen[target] + whole + n) for target, n in odd.items())]

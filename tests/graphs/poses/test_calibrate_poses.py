@@ -120,7 +120,7 @@ def test_one_wild_pose_is_left_out_by_name(tx90l, result):
     target = poses.target.copy()
     target[17] += [0.0, 3e-3, 0.0]
     found = calibrate_poses(tx90l, [replace(poses, target=target)])
-    assert [name for _, name, _ in found.left_out] == ["17"]
+    assert [each.name for each in found.left_out] == ["17"]
     assert on(found.robot, "poses_verification")["p90_mm"] <= 1.2 * on(result.robot, "poses_verification")["p90_mm"]
 
 

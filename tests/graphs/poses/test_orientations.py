@@ -130,7 +130,7 @@ def test_an_orientation_that_is_off_takes_its_pose_with_it(tx90l, simulated):
     turn = simulated[0].turn.copy()
     turn[5] = pin.exp3(np.array([0.0, 4e-3, 0.0])) @ turn[5]
     found = calibrate_poses(tx90l, [replace(simulated[0], turn=turn)])
-    assert [name for _, name, _ in found.left_out] == ["5"]
+    assert [each.name for each in found.left_out] == ["5"]
 
 
 def test_orientations_that_are_wrong_in_some_poses_are_told_with_these_poses(tx90l, simulated):

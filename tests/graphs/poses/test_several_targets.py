@@ -245,7 +245,7 @@ def test_a_target_that_a_reflection_moved_is_left_out_alone(robot, simulated, si
     place = left.place.copy()
     place[[4, 11]] += [0.0, size, 0.0]
     found = calibrate_poses(robot, [replace(simulated[0], others=(replace(left, place=place), right))])
-    assert sorted(name for _, name, _ in found.left_out) == ["11 (left)", "4 (left)"]
+    assert sorted(each.name for each in found.left_out) == ["11 (left)", "4 (left)"]
     assert found.count == 30 and found.problems[0].measured == 3 * (90 - 2)
     truth = simulated[1]["parameters"]
     for name in ("left.lx", "left.ly", *WRIST):
@@ -255,7 +255,7 @@ def test_a_target_that_a_reflection_moved_is_left_out_alone(robot, simulated, si
 def test_angles_that_are_off_take_the_whole_pose_with_them(robot, simulated):
     q = simulated[0].q.copy()
     q[11, 1] += 3e-3
-    assert [name for _, name, _ in calibrate_poses(robot, [replace(simulated[0], q=q)]).left_out] == ["11"]
+    assert [each.name for each in calibrate_poses(robot, [replace(simulated[0], q=q)]).left_out] == ["11"]
 
 
 def test_a_target_that_comes_loose_is_named_as_the_one(robot, simulated):

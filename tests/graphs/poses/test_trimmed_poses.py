@@ -31,7 +31,7 @@ def test_all_poses_that_are_off_are_left_out_and_no_other(tx90l, seed, together)
     target = poses.target.copy()
     target[wrong] += 2e-3 * away / np.linalg.norm(away, axis=1)[:, None]
     result = calibrate_poses(tx90l, [replace(poses, target=target)])
-    assert sorted(int(name) for _, name, _ in result.left_out) == wrong.tolist()
+    assert sorted(int(each.name) for each in result.left_out) == wrong.tolist()
     assert 0.7 < result.repeatability < 1.4
 
 
