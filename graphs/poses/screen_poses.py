@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from jointscope.factors.calibration import DYNAMICS, Calibration
 from jointscope.graphs.poses.pose_set import PoseSet
-from jointscope.graphs.poses.screen_targets import screen_targets, screen_tool
+from jointscope.graphs.poses.screen_targets import check_lost, screen_targets, screen_tool
 from jointscope.graphs.poses.tip_errors import contact_distances
 from jointscope.graphs.poses.tracker_start import tracker_and_target
 from jointscope.robots.errors import RecordingError
@@ -67,13 +67,7 @@ def _check_angles(problem: PoseSet) -> None:
 
 def _check_targets(problem: PoseSet, target: Array) -> None:
     poses, place = problem.poses, problem.robot.path.name
-    lost = [poses.names[i] for i in np.flatnonzero(np.all(target == 0.0, axis=1))]
-    if lost:
-        raise RecordingError(
-            f"{poses.path}: the target is at exactly zero in pose "
-            f"{', '.join(lost[:5])}{' and more' * (len(lost) > 5)}: "
-            "the tracker had lost it; remove these poses"
-        )
+    check_lost(poses, target, "the target", "poses")
     if len(poses) < FEWEST:
         return
     predicted = problem.point(Calibration.of(problem.robot).only([DYNAMICS])).target

@@ -27,7 +27,7 @@ from jointscope.robots.geometry.rotations import (
     spread,
 )
 from jointscope.robots.geometry.tracker_fit import base_from_tracker
-from jointscope.robots.recordings.poses import Sighting
+from jointscope.robots.recordings.poses import Poses, Sighting
 
 Array = NDArray[np.float64]
 FEWEST = 6  # sightings that tell a mistake from chance
@@ -51,12 +51,7 @@ def screen_targets(problem: PoseSet) -> None:
     if problem.poses.target is None or problem.targets.plain:
         return
     for sighting in problem.targets.sightings:
-        lost = [problem.poses.names[i] for i in np.flatnonzero(np.all(sighting.place == 0.0, axis=1))]
-        if lost:
-            raise RecordingError(
-                f"{problem.poses.path}: the target {sighting.name} is at exactly zero in pose {', '.join(lost[:5])}"
-                f"{' and more' * (len(lost) > 5)}: the tracker had lost it; remove these rows"
-            )
+        check_lost(problem.poses, sighting.place, f"the target {sighting.name}", "rows")
     found = mounts(problem.robot)
     _check_units(problem)
     known = [s for s in problem.targets.sightings if _is_known(problem, found[s.name])]
@@ -64,6 +59,26 @@ def screen_targets(problem: PoseSet) -> None:
         _check_names(problem, one, other)
     for one, other in combinations(problem.targets.sightings, 2):
         _check_some_names(problem, one, other)
+
+
+def check_lost(poses: Poses, places: Array, target: str, what: str) -> None:
+    """Looks for poses in which a target is at the very zero that trackers give when they see none.
+
+    Args:
+        poses: the session.
+        places: of the target in each pose, shape (m, 3) [m].
+        target: what it is called in a message.
+        what: of the session should be removed.
+
+    Raises:
+        RecordingError: there are some.
+    """
+    lost = [poses.names[i] for i in np.flatnonzero(np.all(places == 0.0, axis=1))]
+    if lost:
+        raise RecordingError(
+            f"{poses.path}: {target} is at exactly zero in pose {', '.join(lost[:5])}{' and more' * (len(lost) > 5)}: "
+            f"the tracker had lost it; remove these {what}"
+        )
 
 
 def screen_tool(problem: PoseSet) -> None:
