@@ -3,8 +3,7 @@
 
 from __future__ import annotations
 
-from collections import deque
-from weakref import ref
+from operator import is_
 
 from jointscope.graphs.screening.encoder_jumps import JUMP, jump_notices
 from jointscope.graphs.screening.exchanged_joints import EXCHANGED, exchanged_joints
@@ -32,36 +31,32 @@ PLAIN_MISTAKES = (
 )
 """Kinds of notices that say what is wrong in a robot file, or that a recording is one of two robots."""
 
-LATEST = 32  # screenings whose notices are kept, for all that ask for the same objects after one another
-_known: deque[tuple[ref[Recording], ref[Robot], list[int], list[Notice]]] = deque(maxlen=LATEST)
 
-
-def screen_all(recording: Recording, robot: Robot, every_joint: bool = False) -> list[Notice]:
+def screen_all(recording: Recording, robot: Robot) -> list[Notice]:
     """What `screen` says, and all else that looks odd; a recording is screened once for a robot.
 
     Args:
-        recording: what was measured.
+        recording: what was measured; it keeps what is found.
         robot: what it was measured on.
-        every_joint: demand that every joint moves.
 
     Raises:
         RecordingError: as the screening says.
     """
-    streams = [id(stream) for stream in recording.streams.values()]
-    for recorded, modelled, of_streams, notices in tuple(_known):
-        if recorded() is recording and modelled() is robot and of_streams == streams and not every_joint:
+    streams = tuple(recording.streams.values())
+    for screened, of_streams, notices in recording.screenings:
+        if screened is robot and len(streams) == len(of_streams) and all(map(is_, streams, of_streams)):
             return list(notices)
-    notices = _screened(recording, robot, every_joint)
-    _known.append((ref(recording), ref(robot), streams, notices))
+    notices = _screened(recording, robot)
+    recording.screenings.append((robot, streams, notices))
     return list(notices)
 
 
-def _screened(recording: Recording, robot: Robot, every_joint: bool) -> list[Notice]:
+def _screened(recording: Recording, robot: Robot) -> list[Notice]:
     odd, transmission = [], mistaken_transmission(recording, robot)
     if transmission is not None:
         odd = [Notice("transmission", MISTAKEN_TRANSMISSION, 0, transmission.sentence(robot))]
         robot = transmission.mended(robot)  # a wrong matrix turns gyros and exceeds limits
-    odd += [*screen(recording, robot, every_joint), *jump_notices(recording, robot)]
+    odd += [*screen(recording, robot), *jump_notices(recording, robot)]
     odd += mistaken_accelerometers(recording, robot)
     odd += mistaken_torque_sensors(recording, robot)
     odd += mistaken_hold(recording, robot)

@@ -7,6 +7,7 @@ absolute start in nanoseconds is kept so that a sample can be found again in its
 
 from __future__ import annotations
 
+from collections import deque
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
@@ -25,6 +26,7 @@ robot file contradicts them."""
 COMMAND_PERIODS, COMMAND_SECONDS = 5.0, 0.01  # [1], [s] a pause of the commands is longer than both
 FEWEST_STEPS = 10  # that show a period
 SPREAD, LONG_TAIL = 0.5, 3.0  # [periods] typical and 90 % largest deviation of steps, above which there is no period
+LATEST = 8  # screenings that a recording keeps
 SMALLEST_SHARE = 0.2  # of the samples that have to be left; a hole in the recording takes none away
 
 
@@ -153,6 +155,8 @@ class Recording:
             its motor is any of a band, so that it tells nothing.
         posture: positions [rad] or [m] of joints that are not the robot's and stand still, by name.
         shortened: whether long holes were made short, so that times behind them are not those of the stamps.
+        screenings: the latest, each with its robot, streams and notices, for all who ask for the same again; a changed
+            copy has none yet.
     """
 
     path: str
@@ -165,6 +169,9 @@ class Recording:
     sticking: Mapping[str, tuple[tuple[float, float], ...]] = field(default_factory=dict)
     posture: Mapping[str, float] = field(default_factory=dict)
     shortened: bool = False
+    screenings: deque[tuple[object, tuple[Stream, ...], list[Notice]]] = field(
+        default_factory=lambda: deque(maxlen=LATEST), init=False, compare=False
+    )
 
     def __repr__(self) -> str:
         """One line: "train.mcap: 16.000 s; command (16000 samples, 3 channels), imu1 (16000 samples, 3 channels)"."""

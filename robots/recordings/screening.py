@@ -22,7 +22,6 @@ from jointscope.robots.recordings.recording import Notice, Recording, Stream
 from jointscope.robots.recordings.resting_joints import (
     MOVED_ANGLE,
     joints_without_motion,
-    must_move,
     what_it_cannot_tell,
 )
 from jointscope.robots.recordings.still_stretches import OFTEN, standing_share
@@ -43,14 +42,12 @@ PERCENT = 100.0
 OVER_VOLTAGE = 1.2  # times the supply
 
 
-def screen(recording: Recording, robot: Robot, every_joint: bool = False) -> list[Notice]:
+def screen(recording: Recording, robot: Robot) -> list[Notice]:
     """Screens a recording.
 
     Args:
         recording: what was measured.
         robot: what it was measured on.
-        every_joint: demand that every joint moves, as a calibration from this recording alone does; otherwise a
-            joint at rest is a notice.
 
     Returns:
         What looks odd.
@@ -76,7 +73,7 @@ def screen(recording: Recording, robot: Robot, every_joint: bool = False) -> lis
     for biased in robot.biased:
         _check_frozen(recording.streams[biased.name])
     notices += _check_limits(motion, robot)
-    notices += _check_motion(recording, robot, every_joint)
+    notices += _check_motion(recording, robot)
     notices += check_targets(recording, robot, motion)
     odd = check_gyros(recording, robot, motion)
     return notices + odd + check_scales(recording, robot, suspected={notice.stream for notice in odd})
@@ -229,13 +226,11 @@ def _unit_hint(robot: Robot, joint: int, excess: float) -> str:
     return f"check {place}"
 
 
-def _check_motion(recording: Recording, robot: Robot, every_joint: bool) -> list[Notice]:
+def _check_motion(recording: Recording, robot: Robot) -> list[Notice]:
     resting = joints_without_motion(recording, robot)
     if not resting:
         return []
     if len(resting) == robot.n:
         raise RecordingError("no joint moves in this recording; expected motion: nothing can be learned from rest")
-    if every_joint:
-        must_move(robot, [recording])
     text = what_it_cannot_tell(robot, resting)
     return [Notice(robot.motor_encoder.name, "info", len(resting), text)]

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import pickle
 from dataclasses import replace
 
 import pytest
@@ -17,9 +18,7 @@ from jointscope.graphs.screening.screen_all import screen_all
 def asked(monkeypatch):
     """Robots that were screened, one for each time."""
     robots, screened = [], module._screened
-    monkeypatch.setattr(
-        module, "_screened", lambda rec, robot, every: robots.append(robot) or screened(rec, robot, every)
-    )
+    monkeypatch.setattr(module, "_screened", lambda rec, robot: robots.append(robot) or screened(rec, robot))
     return robots
 
 
@@ -44,3 +43,9 @@ def test_another_robot_another_recording_and_another_stream_are_screened(asked, 
     recording.streams["command"] = replace(command, values=0.5 * command.values)
     screen_all(recording, robot)
     assert len(asked) == 4
+
+
+def test_a_changed_copy_begins_without_screenings_and_a_recording_is_equal_to_itself_after_one(recording, tmp_path):
+    screen_all(recording, pendulum(tmp_path, 1e-5, held=", held: true"))
+    assert len(recording.screenings) == 1 and not replace(recording).screenings
+    assert pickle.loads(pickle.dumps(recording)).notices == recording.notices
