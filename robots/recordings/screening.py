@@ -14,7 +14,6 @@ from jointscope.robots.errors import RecordingError
 from jointscope.robots.model.command_words import init_command
 from jointscope.robots.model.robot import Robot
 from jointscope.robots.recordings.encoder_gyro_scale import check_scales
-from jointscope.robots.recordings.held_joints import about_bodies
 from jointscope.robots.recordings.imu_plausibility import check_accelerometers, check_gyros
 from jointscope.robots.recordings.joint_motion import JointMotion, joint_motion
 from jointscope.robots.recordings.motor_zero import with_motor_zero
@@ -27,7 +26,7 @@ from jointscope.robots.recordings.resting_joints import (
 from jointscope.robots.recordings.still_stretches import OFTEN, standing_share
 from jointscope.robots.recordings.target_plausibility import check_targets
 from jointscope.robots.recordings.wrapped_counter import wrapping_jump
-from jointscope.robots.units import UNITS, si_factor, si_unit
+from jointscope.robots.units import UNITS, of_slide, si_factor, si_unit
 
 Array = NDArray[np.float64]
 
@@ -40,6 +39,7 @@ FEW_JOINTS = 2  # others that keep their limits are enough to say that it is thi
 DUTY_LIMIT = 1.0 + 1e-6
 PERCENT = 100.0
 OVER_VOLTAGE = 1.2  # times the supply
+SAME = 1e-3  # [rad], [m] a position that the robot file has already
 
 
 def screen(recording: Recording, robot: Robot) -> list[Notice]:
@@ -234,3 +234,28 @@ def _check_motion(recording: Recording, robot: Robot) -> list[Notice]:
         raise RecordingError("no joint moves in this recording; expected motion: nothing can be learned from rest")
     text = what_it_cannot_tell(robot, resting)
     return [Notice(robot.motor_encoder.name, "info", len(resting), text)]
+
+
+def about_bodies(recording: Recording, robot: Robot) -> list[Notice]:
+    """Where other joints are held, if the robot file does not say so, and remarks on inertias.
+
+    Args:
+        recording: what was measured.
+        robot: as its file has it.
+    """
+    tree, name = (robot.as_filed or robot.tree), robot.motor_encoder.name
+    notices = [Notice(name, "info", 0, remark) for remark in tree.remarks]
+    held = tree.posture(recording.posture)
+    new = {joint: at for joint, at in held.items() if not abs(tree.locked.get(joint, 0.0) - at) < SAME}
+    if new:
+        places = ", ".join(f"{at:.4g} {_unit(robot, joint)}" for joint, at in new.items())
+        verb = "is" if len(new) == 1 else "are"
+        text = f"{', '.join(new)} {verb} not moved: held at {places} as in the recording"
+        filed = [f"{joint} at {tree.locked[joint]:.4g} {_unit(robot, joint)}" for joint in new if joint in tree.locked]
+        text += f" (the robot file locks {', '.join(filed)})" if filed else ""
+        notices.append(Notice(name, "info", len(new), text))
+    return notices
+
+
+def _unit(robot: Robot, joint: str) -> str:
+    return of_slide("rad") if robot.tree.is_slide(joint) else "rad"

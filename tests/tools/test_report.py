@@ -13,9 +13,8 @@ import pytest
 from jointscope.robots.recordings.recording import Recording
 from jointscope.tools.presentation.numbers import prefixed, significant, with_sigma
 from jointscope.tools.report import calibration_report, comparison_report
-from jointscope.tools.report.page.decimate import min_max
 from jointscope.tools.report.page.page import sentence
-from jointscope.tools.report.page.plot import Axes, Band, Bars, Curve, path, plot
+from jointscope.tools.report.page.plot import Axes, Band, Bars, Curve, min_max, path, plot
 from jointscope.tools.report.page.scale import log_ticks, nice_ticks
 from jointscope.tools.report.page.sparse_series import joined
 from jointscope.tools.terminal.calibration_text import calibration_text

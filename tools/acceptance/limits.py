@@ -13,8 +13,10 @@ number or the quantity names its unit: nothing must pass because it was meant in
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import re
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from numbers import Real
 from pathlib import Path
 from typing import Any
 
@@ -26,7 +28,6 @@ from jointscope.robots.parts.parameter import Parameter
 from jointscope.robots.unit_text import unit_factor
 from jointscope.robots.yaml_document import read_document
 from jointscope.robots.yaml_section import Section, did_you_mean
-from jointscope.tools.acceptance.bounds import read_bounds
 
 BESIDE = ("because", "horizon", "against")  # keys that say more of a limit
 RANGES = ("between", "at_most", "at_least")
@@ -38,6 +39,7 @@ QUANTITIES: Mapping[str, tuple[str, ...]] = {
 }
 """What can be limited, by what it is of."""
 _OWN_UNITS = {"percent": "%", "mm": "mm", "mrad": "mrad", "chi2": "1"}
+_BOUND = re.compile(r"\s*([-+]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][-+]?[0-9]+)?)\s*(.*?)\s*")
 
 
 def own_unit(quantity: str) -> str | None:
@@ -183,3 +185,52 @@ def _horizon(section: Section) -> str:
     if value == "open_loop":
         return "open_loop"
     return f"{float(section.number('horizon', positive=True))}"
+
+
+def read_bounds(section: Section, quantity: str) -> tuple[float, float, str]:
+    """Lowest and highest value that a limit allows, and their unit, empty where none is written.
+
+    Raises:
+        RobotError: it is no number, or no pair of numbers.
+    """
+    return _READ.get(quantity, _at_most)(section, quantity)
+
+
+def _between(section: Section, key: str) -> tuple[float, float, str]:
+    pair = section.raw(key)
+    if not isinstance(pair, Sequence) or isinstance(pair, str) or len(pair) != 2:
+        raise RobotError(f"{section.place}: {key}: expected [lowest, highest], got {pair!r}")
+    (lower, first), (upper, unit) = (_bound(section, key, value) for value in pair)
+    if first and unit != first:
+        factor = unit_factor(unit or "1", first)
+        if factor is None:
+            raise RobotError(
+                f"{section.place}: {key}: expected two bounds of one unit, got {pair[0]!r} and {pair[1]!r}"
+            )
+        upper, unit = factor * upper, first
+    if lower > upper:
+        raise RobotError(f"{section.place}: {key}: expected [lowest, highest], got [{pair[0]}, {pair[1]}]")
+    return lower, upper, unit
+
+
+def _at_most(section: Section, key: str) -> tuple[float, float, str]:
+    return -np.inf, *_bound(section, key, section.raw(key))
+
+
+def _at_least(section: Section, key: str) -> tuple[float, float, str]:
+    value, unit = _bound(section, key, section.raw(key))
+    return value, np.inf, unit
+
+
+def _bound(section: Section, key: str, value: Any) -> tuple[float, str]:
+    """A number and its unit, from 0.3, "0.3 N m" or "55 um"; no unit is an empty text."""
+    if isinstance(value, str):
+        parts = _BOUND.fullmatch(value)
+        if parts is not None and np.isfinite(float(parts[1])):
+            return float(parts[1]), parts[2]
+    elif isinstance(value, Real) and not isinstance(value, bool) and np.isfinite(float(value)):
+        return float(value), ""
+    raise RobotError(f"{section.place}: {key}: expected a number with its unit, such as '0.3 N m', got {value!r}")
+
+
+_READ: Mapping[str, Callable[[Section, str], tuple[float, float, str]]] = {"between": _between, "at_least": _at_least}

@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from jointscope.graphs.starts.end_stops import EndStop, end_stops
 from jointscope.robots.errors import RecordingError
 from jointscope.robots.model.robot import Robot
 from jointscope.robots.parts.sensors import LinkEncoder, MotorEncoder
@@ -20,7 +21,6 @@ from jointscope.tools.bags.clocks.one_time_axis import on_one_time_axis
 from jointscope.tools.bags.clocks.own_stamps import at_message_stamps
 from jointscope.tools.bags.clocks.time_order import in_time_order
 from jointscope.tools.bags.clocks.timed_samples import TimedSamples
-from jointscope.tools.bags.end_stops_left_out import with_end_stops_left_out
 from jointscope.tools.bags.fitting_messages import fitting_messages, left_out_notices
 from jointscope.tools.bags.held_posture import held_posture
 from jointscope.tools.bags.messages.columns import Columns
@@ -53,6 +53,7 @@ from jointscope.tools.bags.tidying.stream_notices import (
 from jointscope.tools.bags.tidying.tidy_samples import cleaned_sensor
 
 SHARED = 0.5  # of the rows of a stream that lack a channel, from which several drivers make it
+LISTED = 3  # contacts that are named by their times
 
 
 def read_recording(
@@ -234,4 +235,37 @@ def _stream(need: StreamSource, samples: TimedSamples, start_ns: int) -> Stream:
         unit=joined(need.source.si_units(len(need.channels))),
         received=(samples.received - start_ns) / 1e9,
         filled=samples.filled,
+    )
+
+
+def with_end_stops_left_out(recording: Recording, robot: Robot) -> Recording:
+    """The recording without the contacts, and with a notice of each stop.
+
+    Raises:
+        RecordingError: hardly anything would be left.
+    """
+    stops = end_stops(robot, recording)
+    if not stops:
+        return recording
+    said = [_sentence(stop, robot) for stop in stops]
+    try:
+        without = recording.leaving_out([stretch for stop in stops for stretch in stop.stretches])
+    except RecordingError as err:
+        raise RecordingError(f"{'; '.join(said)}. {err}") from err
+    notices = [
+        Notice(robot.motor_encoder.name, "end_stop", len(stop.stretches), f"{text}; left out there")
+        for stop, text in zip(stops, said, strict=True)
+    ]
+    return replace(without, notices=[*without.notices, *notices])
+
+
+def _sentence(stop: EndStop, robot: Robot) -> str:
+    length, torque = (robot.unit_at(stop.joint, unit) for unit in ("rad", "N m"))
+    times = ", ".join(f"{t0:.2f} to {t1:.2f}" for t0, t1 in stop.stretches[:LISTED])
+    more = len(stop.stretches) - LISTED
+    total = sum(t1 - t0 for t0, t1 in stop.stretches)
+    return (
+        f"{stop.joint} presses with up to {stop.torque:.2g} {torque} against something at {stop.at:.4g} {length}, the "
+        f"end of its motion, as against an end stop ({times} s{f' and {more} times more' if more > 0 else ''}; "
+        f"{total:.2g} s in all)"
     )

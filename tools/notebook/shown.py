@@ -11,8 +11,12 @@ from itertools import accumulate
 from pathlib import Path
 from typing import Any
 
+from jointscope.graphs.calibration.calibration_result import CalibrationResult
+from jointscope.graphs.comparison.comparison_result import ComparisonResult
+from jointscope.graphs.discovery.diagnosis_result import Diagnosis
+from jointscope.graphs.discovery.discovery_result import Discovery
+from jointscope.graphs.fixed_lag.replay.replay_result import ReplayResult
 from jointscope.robots.errors import JointscopeError
-from jointscope.tools.notebook.made_from import recorded_files, robot_files
 from jointscope.tools.presentation.numbers import significant
 from jointscope.tools.terminal.text_table import text_table
 from jointscope.tools.verb_parts.result_files import ResultFiles
@@ -93,9 +97,9 @@ class Shown(ABC):
             JointscopeError: a file cannot be written.
         """
         files = ResultFiles(*(None if path is None else Path(path) for path in (report, rrd, json, robot, figures)))
-        check_outputs(files.all, inputs=recorded_files(self))
+        check_outputs(files.all, inputs=_recorded_files(self))
         named = {"output": files.robot, "report": files.report, "rrd": files.rrd, "json": files.json}
-        check_robot_files(named, robot_files(self))
+        check_robot_files(named, _robot_files(self))
         self.write(files)
 
     def _repr_html_(self) -> str:
@@ -142,3 +146,27 @@ def _outside(module: str, method: str, way: str) -> Any:
         return importlib.import_module(module)
     except ImportError as err:
         raise JointscopeError(f"{method} needs {module.partition('.')[0]}, which is not installed; do: {way}") from err
+
+
+def _recorded_files(found: Any) -> list[str]:
+    """Paths of its recordings; of those that are no file, none."""
+    if isinstance(found, CalibrationResult):
+        paths = [bag.recording.path for bag in found.bags]
+    elif isinstance(found, ComparisonResult):
+        paths = [found.recording.path]
+    elif isinstance(found, Diagnosis | Discovery):
+        paths = [recording.path for recording in (*found.recordings, found.heldout) if recording is not None]
+    else:
+        paths = [found.source.path] if isinstance(found, ReplayResult) else []
+    return [path for path in paths if path]
+
+
+def _robot_files(found: Any) -> list[Path]:
+    """Files of the robots that it began with."""
+    if isinstance(found, CalibrationResult):
+        return [found.start.path]
+    if isinstance(found, ComparisonResult):
+        return [model.robot.path for model in found.models]
+    if isinstance(found, Discovery):
+        return [found.steps[0].robot.path]
+    return [found.robot.path] if isinstance(found, Diagnosis | ReplayResult) else []

@@ -7,15 +7,19 @@ from dataclasses import replace
 from html import escape
 from pathlib import Path
 
+from jointscope.graphs.discovery.diagnosis_words import there_but_small
 from jointscope.graphs.discovery.discovery_result import Discovery, DiscoveryStep
+from jointscope.tools.presentation.candidate_numbers import share_text
 from jointscope.tools.presentation.compared_models import of_discovery
+from jointscope.tools.presentation.model_answer import changes, discovery_answer, judged_error, unexplained_share
+from jointscope.tools.presentation.numbers import significant
+from jointscope.tools.report.page.answer_box import answer_box
 from jointscope.tools.report.page.notices import notices
 from jointscope.tools.report.page.page import Section, foldable, page
 from jointscope.tools.report.page.provenance import provenance
 from jointscope.tools.report.sections.comparison.horizon_curve import horizon_curve
 from jointscope.tools.report.sections.comparison.worst_windows import worst_windows
 from jointscope.tools.report.sections.diagnosis.channel_failures import channel_failures
-from jointscope.tools.report.sections.diagnosis.discovery_verdict import discovery_verdict
 from jointscope.tools.report.sections.diagnosis.failure_correlations import failure_correlations
 from jointscope.tools.report.sections.diagnosis.found_parameters import found_parameters
 from jointscope.tools.report.sections.diagnosis.next_commands import after_discovery
@@ -46,7 +50,7 @@ def discovery_report(result: Discovery) -> str:
     compared = of_discovery(result)
     recordings = [*result.recordings, *([result.heldout] if result.heldout is not None else [])]
     sections = [
-        discovery_verdict(result),
+        _discovery_verdict(result),
         waterfall(result),
         found_parameters(result),
         replace(worst_windows(compared), title=BEFORE_AFTER, lead=BEFORE_AFTER_LEAD),
@@ -98,3 +102,22 @@ def _later(step: DiscoveryStep, k: int) -> str:
         torque_maps(step.diagnosis.missing, f"maps{k}"),
     ]
     return "".join(f"<h3>{escape(part.title)}</h3>{part.body}" for part in parts)
+
+
+def _discovery_verdict(result: Discovery) -> Section:
+    """Headline, big numbers, what every step means."""
+    first, last = result.steps[0], result.steps[-1]
+    judged = "held-out recording" if result.held_out else "training recordings"
+    before, after = significant(judged_error(first)), significant(judged_error(last))
+    arrow = f"{before} → {after}" if len(result.steps) > 1 else after
+    figures = [
+        (f"{arrow} <small>σ</small>", f"error {result.judged_by} on the {judged}"),
+        (f"{significant(last.floor)} <small>σ</small>", "what noise and the uncertainty of the state alone would give"),
+        (share_text(unexplained_share(last)), "of the squared error is still unexplained"),
+        (str(len(changes(result))), f"effects changed, {len(result.steps)} models calibrated"),
+    ]
+    told = [step.paragraph for step in result.steps if step.paragraph]
+    if last.diagnosis is not None and last.diagnosis.small:
+        told.append(there_but_small(last.diagnosis.small))
+    told.append(f"Stopped: {result.stop_reason}")
+    return answer_box("verdict", "Which effects did the model lack?", discovery_answer(result), figures, told)

@@ -3,16 +3,24 @@
 
 from __future__ import annotations
 
+from jointscope.factors.calibration import DYNAMICS, Calibration
 from jointscope.graphs.calibration.calibration_result import CalibrationResult, ParameterEstimate
 from jointscope.graphs.calibration.findings import AS_STATED
-from jointscope.tools.presentation.numbers import prefixed, significant, with_sigma
-from jointscope.tools.terminal.beside_motion_text import poses_beside_motion, responses_beside_motion
+from jointscope.graphs.frequency.explained import pose_fit
+from jointscope.graphs.frequency.frequency_summary import FrequencySummary
+from jointscope.graphs.poses.pose_set import PoseSet
+from jointscope.graphs.poses.tip_errors import tip_errors
+from jointscope.tools.bags.clocks.durations import counted
+from jointscope.tools.presentation.numbers import percent, prefixed, significant, with_sigma
+from jointscope.tools.presentation.tip_numbers import tip_cells, tip_head
 from jointscope.tools.terminal.rests_text import rests_beside_motion
 from jointscope.tools.terminal.text_table import text_table
 from jointscope.tools.verdicts.judgement import Judgement, judge
+from jointscope.tools.verdicts.same_values import same_values
 
 SHOWN_FINDINGS = 6  # the report has them all
 SHOWN_DIRECTIONS = 3
+SIZES = ("mean", "p90", "max")
 
 
 def calibration_text(result: CalibrationResult, judgement: Judgement | None = None) -> str:
@@ -24,8 +32,8 @@ def calibration_text(result: CalibrationResult, judgement: Judgement | None = No
         _weak_directions(result),
         _channels(result),
         rests_beside_motion(result),
-        poses_beside_motion(result),
-        responses_beside_motion(result),
+        _poses_beside_motion(result),
+        _responses_beside_motion(result),
     ]
     return "\n\n".join(part for part in parts if part)
 
@@ -80,3 +88,33 @@ def _channels(result: CalibrationResult) -> str:
         factor, unit = prefixed(max(fit.rmse, fit.sigma), fit.unit)
         rows.append([name, significant(factor * fit.rmse), significant(factor * fit.sigma), unit, f"{fit.chi2:.2f}"])
     return text_table(["channel", "rms error", "sensor sigma", "unit", "chi2 (1 is expected)"], rows, "<>><>")
+
+
+def _poses_beside_motion(result: CalibrationResult) -> str:
+    """How far targets are from where the model has them; empty without poses."""
+    problems = [problem.of_robot(result.robot) for problem, *_ in result.sets if isinstance(problem, PoseSet)]
+    if not problems:
+        return ""
+    errors = [tip_errors(problem) for problem in problems]
+    shown = tip_head(max(errors, key=lambda each: len(each.turns)), SIZES)
+    rows = []
+    for problem, each in zip(problems, errors, strict=True):
+        cells = tip_cells(each, SIZES)
+        cells += [""] * (len(shown) - len(cells))
+        rows.append([problem.poses.path, str(len(problem.poses)), *cells])
+    return text_table(["poses in the same estimate", "number", *shown], rows, "<>" + ">" * len(shown))
+
+
+def _responses_beside_motion(result: CalibrationResult) -> str:
+    """What the torque balance leaves, and whether both kinds agree; empty without frequency responses."""
+    problems = [p for s, *_ in result.sets if isinstance(s, FrequencySummary) for p in s.problems]
+    if not problems:
+        return ""
+    at = Calibration.of(result.robot).only([DYNAMICS])
+    left = max(float(pose_fit(problem.of_robot(result.robot), at).left.max()) for problem in problems)
+    lines = [
+        f"{counted(len(problems), 'pose')} that {'was' if len(problems) == 1 else 'were'} shaken in the same estimate: "
+        f"the balance leaves up to {percent(left)} of a motor's torque.",
+        *(f"  {text}" for _, _, text in same_values(result)),
+    ]
+    return "\n".join(lines)

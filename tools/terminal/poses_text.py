@@ -5,18 +5,22 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
+import numpy as np
+
 from jointscope.graphs.poses.calibrate_poses import PoseCalibration
 from jointscope.graphs.poses.determined import combination_text
 from jointscope.graphs.poses.tip_errors import TipErrors, summary
+from jointscope.robots.geometry.error_parameters import BEARING, STIFFNESS
+from jointscope.robots.parts.parameter import Parameter
 from jointscope.tools.bags.clocks.durations import counted
-from jointscope.tools.presentation.numbers import with_sigma
-from jointscope.tools.presentation.silent_values import silent_sentences
+from jointscope.tools.presentation.numbers import significant, with_sigma
 from jointscope.tools.presentation.tip_numbers import target_rows, tip_cells, tip_head
 from jointscope.tools.terminal.text_table import text_table
 from jointscope.tools.verdicts.pose_judgement import judge_poses
 
 SHOWN_OUT, SHOWN_COMBINATIONS = 5, 18
 SHOWN_SIZES = ("mean", "p90", "max")
+SIGMAS = 2.0  # of the bound that is said
 
 
 def pose_calibration_text(result: PoseCalibration) -> str:
@@ -103,3 +107,29 @@ def _combinations(result: PoseCalibration) -> str:
         "combinations move no target, so priors share them out:"
     )
     return "\n".join([head, *lines])
+
+
+def silent_sentences(result: PoseCalibration) -> list[str]:
+    """One for what is not told, one for what is only known to be stiff."""
+    silent = [name for name in result.names if name not in result.told]
+    bounds = {name: bound for name in silent if (bound := _at_least(result.robot.parameters[name]))}
+    others = [name for name in silent if name not in bounds]
+    said = [f"The poses say nothing about {', '.join(others)}."] if others else []
+    if bounds:
+        stiff = ", ".join(f"{name} above {significant(bound, 2)} N m/rad" for name, bound in bounds.items())
+        said.append(f"Too stiff for these poses to see them give way, so only bounds are known (two sigmas): {stiff}.")
+    return said
+
+
+def _at_least(p: Parameter) -> float | None:
+    """Stiffness that a spring has at the least; None where poses do not say that it is above its prior.
+
+    What poses know of the logarithm of a stiffness they know, as a share, of its compliance, which may be zero.
+    """
+    if not p.name.endswith((f".{STIFFNESS}", *BEARING)) or not p.positive or not p.sigma:
+        return None
+    told = (p.value / p.sigma) ** 2 - p.coordinate_sigma**-2.0
+    if told <= 0.0:
+        return None
+    bound = p.value / (1.0 + SIGMAS / float(np.sqrt(told)))
+    return bound if bound > p.prior else None

@@ -14,10 +14,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from jointscope.factors.calibration import DYNAMICS, Calibration, rotation_block
 from jointscope.factors.interpolated import interpolate
 from jointscope.graphs.comparison.compare import smooth
-from jointscope.graphs.comparison.short_reversals import with_short_reversals
 from jointscope.graphs.fixed_lag.window.state_names import state_names
+from jointscope.graphs.problem.bag_problem import BagProblem
+from jointscope.graphs.problem.reversals import times_of_reversals
+from jointscope.graphs.solving.batch_solver import solve
+from jointscope.graphs.solving.estimate import Estimate
 from jointscope.graphs.solving.solver_context import in_solver_context
 from jointscope.robots.model.robot import Robot
 from jointscope.robots.parts.state_layout import StateLayout
@@ -131,7 +135,7 @@ def _finite(recording: Recording) -> Recording:
 @in_solver_context
 def _smoothed(robot: Robot, recording: Recording) -> tuple[Array, Array]:
     """Times, shape (k,), and states, shape (k, d), of the batch smoother."""
-    problem, states, _ = with_short_reversals(*smooth(robot, recording))
+    problem, states, _ = _with_short_reversals(*smooth(robot, recording))
     return problem.timeline.ticks, states
 
 
@@ -146,3 +150,25 @@ def _near(ticks: Array, at: Array) -> NDArray[np.bool_]:
     """Whether a batch tick is close to each time."""
     right = np.clip(np.searchsorted(ticks, at), 1, len(ticks) - 1)
     return np.minimum(np.abs(ticks[right] - at), np.abs(at - ticks[right - 1])) < PERIOD
+
+
+def _with_short_reversals(
+    problem: BagProblem, x: Array, calibration: Calibration
+) -> tuple[BagProblem, Array, Calibration]:
+    """The smoothed problem with its steps divided where dry friction turns over, solved again; shapes as in `smooth`.
+
+    Args:
+        problem: smoothed.
+        x: its states, shape (m + 1, d).
+        calibration: its values; parameters and mountings stay.
+    """
+    robot, ticks = problem.robot, problem.timeline.ticks
+    between = times_of_reversals(robot, ticks, x)
+    if not len(between) or robot.choices.integrator != "simpson":
+        return problem, x, calibration
+    divided = BagProblem.of(robot, problem.recording, between)
+    step, fraction = problem.timeline.locate(divided.timeline.ticks)
+    start = interpolate(robot.layout, x[step], x[step + 1], fraction, problem.timeline.h[step])
+    hold = (DYNAMICS, *(rotation_block(gyro.name) for gyro in robot.gyros))
+    estimate = solve([divided], Estimate((start,), (calibration,)), hold=hold).estimate
+    return divided, estimate.states[0], estimate.calibrations[0]

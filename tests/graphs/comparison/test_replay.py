@@ -13,7 +13,7 @@ from jointscope.graphs.fixed_lag.replay.batch_agreement import BatchAgreement, b
 from jointscope.graphs.fixed_lag.replay.corrections import corrections
 from jointscope.graphs.fixed_lag.replay.nis_windows import NisWindows
 from jointscope.graphs.fixed_lag.replay.replay import SMOOTHED_EVERY, replay
-from jointscope.graphs.fixed_lag.replay.thinned_rows import ThinnedRows
+from jointscope.graphs.fixed_lag.replay.tick_log import ThinnedRows
 from jointscope.robots.errors import EstimatorError, RecordingError
 from jointscope.robots.recordings.arrivals import Arrivals
 from jointscope.robots.recordings.recording import Recording, Stream

@@ -8,7 +8,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from jointscope.graphs.refits.gap_start import with_hidden_gap
+from jointscope.graphs.refits.refit import with_hidden_gap
 from jointscope.graphs.scoring.columns.gap import curves_of, gap_hypotheses
 from jointscope.robots.effect_kinds.effect_at import EffectAt
 from jointscope.robots.files.effect_catalogue import catalogue

@@ -14,7 +14,7 @@ from jointscope.graphs.starts.end_stops import end_stops
 from jointscope.robots.errors import RecordingError
 from jointscope.robots.files.robot_file import load_robot
 from jointscope.robots.recordings.recording import Recording
-from jointscope.tools.bags.end_stops_left_out import with_end_stops_left_out
+from jointscope.tools.bags.read_recording import with_end_stops_left_out
 from jointscope.tools.verdicts.judgement import judge
 
 ARM = Arm("yx", inertia=(0.7, 0.2), dry=(2.0, 0.8), viscous=(1.5, 0.6))

@@ -14,8 +14,8 @@ from jointscope.robots.errors import RobotError
 from jointscope.robots.files.robot_file import load_robot
 from jointscope.robots.files.robot_writer import robot_text
 from jointscope.robots.model.command_words import ready_robots
-from jointscope.robots.recordings.held_joints import about_bodies
 from jointscope.robots.recordings.recording import Recording, Stream
+from jointscope.robots.recordings.screening import about_bodies
 
 JOINTS = "joints: [joint1, joint2, joint3]"
 

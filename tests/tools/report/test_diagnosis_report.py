@@ -11,7 +11,7 @@ from result_page import ResultPage
 from jointscope.graphs.comparison.failure_analysis import FailureAnalysis
 from jointscope.tools.presentation.model_answer import diagnosis_answer, enumerated
 from jointscope.tools.report import diagnosis_report
-from jointscope.tools.report.sections.diagnosis.torque_spectrum import torque_spectrum
+from jointscope.tools.report.sections.diagnosis.torque_over_time import torque_spectrum
 from jointscope.tools.rerun_log.entities.diagnosis_documents import diagnosis_markdown, ranking_markdown
 from jointscope.tools.terminal.diagnosis_text import diagnosis_text
 

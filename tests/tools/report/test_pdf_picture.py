@@ -80,7 +80,7 @@ def test_every_picture_of_a_report_becomes_a_page_and_the_same_again():
 
 
 def test_a_curve_that_no_report_draws_is_refused():
-    from jointscope.tools.report.pdf.path_data import path_of
+    from jointscope.tools.report.pdf.pdf_picture import path_of
 
     with pytest.raises(ValueError, match=r"^path with 'C': expected one of M, L, H, V, Z$"):
         path_of("M0 0C1 1 2 2 3 3")

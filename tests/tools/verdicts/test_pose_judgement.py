@@ -17,9 +17,8 @@ from jointscope.robots.errors import RecordingError
 from jointscope.robots.files.robot_file import load_robot
 from jointscope.tools.bags.at_poses.pose_table import pose_table
 from jointscope.tools.bags.at_poses.read_poses import read_poses
-from jointscope.tools.presentation.silent_values import silent_sentences
 from jointscope.tools.simulator.pose_simulation import PoseConditions, simulate_poses
-from jointscope.tools.terminal.poses_text import pose_calibration_text
+from jointscope.tools.terminal.poses_text import pose_calibration_text, silent_sentences
 from jointscope.tools.verdicts.pose_judgement import judge_poses
 
 pytest.importorskip("mujoco", reason="the simulator needs the extra jointscope[sim]")

@@ -6,10 +6,12 @@ from __future__ import annotations
 import io
 import math
 import re
+from collections.abc import Iterator
 from typing import Any
 from xml.etree import ElementTree
 
 import matplotlib as mpl
+import numpy as np
 from cssselect2 import ElementWrapper
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
@@ -17,7 +19,6 @@ from matplotlib.patches import PathPatch, Rectangle
 from matplotlib.path import Path
 from matplotlib.transforms import Affine2D, Transform, TransformedPath
 
-from jointscope.tools.report.pdf.path_data import path_of
 from jointscope.tools.report.pdf.styles import Style, styled, value
 
 INCH = 96.0  # [px]
@@ -26,6 +27,9 @@ STEP = re.compile(r"(translate|rotate)\(([^)]*)\)")
 ANCHORS = {"start": "left", "middle": "center", "end": "right"}
 SEMIBOLD = 600  # fonts of matplotlib know normal and bold
 Clip = TransformedPath | None
+PART = re.compile(r"([A-Za-z])([^A-Za-z]*)")
+NUMBER = re.compile(r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?")
+TAKES = {"M": 2, "L": 2, "H": 1, "V": 1, "Z": 0}  # numbers a step; reports draw in straight lines
 
 
 def pdf_picture(svg: str) -> bytes:
@@ -149,3 +153,44 @@ def _length(style: Style, name: str, default: float) -> float:
 
 def _numbers(text: str) -> list[float]:
     return [float(number) for number in text.replace(",", " ").split()]
+
+
+def path_of(d: str) -> Path:
+    """Straight lines of a path in the units of the file.
+
+    Args:
+        d: moves and lines, absolute or from the last point.
+
+    Raises:
+        ValueError: the path has a curve.
+    """
+    points, codes = [], []
+    for code, point in _steps(d):
+        points.append(point)
+        codes.append(code)
+    return Path(points, codes) if points else Path([(0.0, 0.0)], [Path.MOVETO])
+
+
+def _steps(d: str) -> Iterator[tuple[np.uint8, tuple[float, float]]]:
+    x = y = 0.0
+    begin = (x, y)
+    for letter, text in PART.findall(d):
+        numbers = [float(number) for number in NUMBER.findall(text)]
+        kind = letter.upper()
+        if kind not in TAKES:
+            raise ValueError(f"path with {letter!r}: expected one of {', '.join(TAKES)}")
+        if kind == "Z":
+            x, y = begin
+            yield Path.CLOSEPOLY, begin
+            continue
+        for k in range(0, len(numbers), TAKES[kind]):
+            step = dict(zip("xy" if TAKES[kind] == 2 else ("x" if kind == "H" else "y"), numbers[k:], strict=False))
+            if letter.islower():
+                x, y = x + step.get("x", 0.0), y + step.get("y", 0.0)
+            else:
+                x, y = step.get("x", x), step.get("y", y)
+            if kind == "M" and not k:
+                begin = (x, y)
+                yield Path.MOVETO, begin
+            else:
+                yield Path.LINETO, (x, y)

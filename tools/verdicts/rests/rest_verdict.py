@@ -8,9 +8,11 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from jointscope.graphs.calibration.calibration_result import ParameterEstimate
+from jointscope.graphs.calibration.calibration_result import CalibrationResult, ParameterEstimate
 from jointscope.graphs.rests.calibrate_rests import RestCalibration
+from jointscope.graphs.rests.doubts import PLACE, Doubt
 from jointscope.graphs.rests.rest_errors import SURELY
+from jointscope.graphs.rests.rests_beside_motion import seen_rests
 from jointscope.graphs.rests.seen_rests import SeenRests
 from jointscope.graphs.rests.taken_for_granted import all_rigid
 from jointscope.robots.model.command_words import bag_arguments, robot_argument
@@ -18,7 +20,6 @@ from jointscope.robots.parts.relative_sigma import relative_sigma
 from jointscope.tools.bags.clocks.durations import counted
 from jointscope.tools.presentation.numbers import significant
 from jointscope.tools.verdicts.rests.not_told import from_one_side, open_gains, standing, unchecked
-from jointscope.tools.verdicts.rests.rest_doubts import doubts_said
 
 LOOSE = 0.25  # sigma of a value above zero, over it, from which it is hardly known
 AS_EXPECTED, DOUBTFUL = 1.3, 2.0  # [sigma] error of rests that sensors explain, and that they do not
@@ -27,6 +28,10 @@ FOLLOWS, BY_CHANCE = 0.1, 1e-5  # share of what friction holds that weights expl
 NO, USABLE = "No, do not rely on this yet", "Usable, with reservations"
 SO = {"bad": NO, "warn": USABLE}
 BEYOND = 0.1  # of its band, that friction may have to hold beyond it
+SURE = 1e-3  # probability by chance, from which a doubt is none any more
+NEAR = 10.0  # chi2 by which others may fall less and be named as well
+MOST = 3
+NAME, TOLD = "Rests that agree with the model", "Rests that tell what they might"
 
 
 def verdict(result: RestCalibration) -> str:
@@ -132,3 +137,48 @@ def _diagnosis(seen: SeenRests) -> str:
     """The command that looks for it."""
     bags = bag_arguments(problem.rests.path for problem in seen.problems)
     return f"`jointscope diagnose {robot_argument(seen.start)} --rests {bags}`"
+
+
+def doubts_said(seen: SeenRests) -> tuple[str, str]:
+    """Level of `judgement.LEVELS` and sentence where rests ask for another model; empty where they do not."""
+    if not seen.doubts:
+        return "good", ""
+    first, sides = seen.doubts[0], from_one_side(seen)
+    named = [d for d in seen.doubts if d.fall > first.fall - NEAR][:MOST]
+    return "bad" if first.p_value < SURE else "warn", (
+        f"these rests are far likelier (chi2 falls by {significant(first.fall, 2)}, p = {first.p_value:.0e}) if "
+        f"{', or '.join(_said(doubt) for doubt in named)}{sides and f'; {sides}'}; {_next(seen, named)}"
+    )
+
+
+def _said(doubt: Doubt) -> str:
+    effect, _, owner = doubt.label.partition("@")
+    return {
+        "load_scale": f"loads are {significant(1.0 + doubt.size, 2)} of what /load says",
+        "link_mass": f"the link of {owner} weighs something else, or elsewhere",
+        "encoder_offset": f"the zero of {owner} is another",
+        "torque_offset": f"a constant torque acts at {owner}, as weight does",
+        "load_dependent_friction": f"friction of {owner} grows with what it carries",
+        PLACE: f"friction of {owner} is not the same at all angles",
+    }[effect]
+
+
+def _next(seen: SeenRests, named: list[Doubt]) -> str:
+    """What to do about it."""
+    bags = bag_arguments(problem.rests.path for problem in seen.problems)
+    command = f"`jointscope diagnose {robot_argument(seen.start)} --rests {bags}`"
+    if all(doubt.label.startswith(PLACE) for doubt in named):
+        return "nothing in the catalogue holds that: calibrate from rests near the postures that you need"
+    return f"weigh, correct, and calibrate again; {command} ranks what may be missing"
+
+
+def rests_agree(result: CalibrationResult) -> list[tuple[str, str, str]]:
+    """Level, name and sentence of each check; none without rests."""
+    rests = seen_rests(result)
+    if rests is None:
+        return []
+    level, said = contradiction(rests)
+    found = [(level, NAME, f"{said[:1].upper()}{said[1:]}." if said else "Links and motors rest where it says.")]
+    if silent := standing(rests) or from_one_side(rests):
+        found.append(("info", TOLD, f"Of the joints, {silent}."))
+    return found

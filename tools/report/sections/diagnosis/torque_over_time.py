@@ -4,6 +4,8 @@
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import NDArray
+from scipy.signal import welch
 
 from jointscope.graphs.discovery.missing_torque import MissingTorque
 from jointscope.robots.units import joined
@@ -11,10 +13,13 @@ from jointscope.tools.presentation.numbers import significant
 from jointscope.tools.report.page.page import Key, Section, figure, foldable
 from jointscope.tools.report.page.plot import Axes, Band, Curve, Mark, plot
 from jointscope.tools.report.sections.diagnosis.torque_maps import NOT_ESTIMATED, candidate_colour, candidate_keys
-from jointscope.tools.report.sections.diagnosis.torque_spectrum import torque_spectrum
 
 SHOWN = 2  # equations that lack most; the others fold
 GROUP = "missing"
+Array = NDArray[np.float64]
+
+SEGMENT = 2.0  # [s] resolves half a hertz
+POINTS = 160  # on the logarithmic axis
 
 
 def torque_over_time(missing: MissingTorque | None, id_: str = "torque") -> Section:
@@ -69,3 +74,31 @@ def _spectra(missing: MissingTorque, order: list[int]) -> str:
     units = joined([f"{missing.unit(row, 'N m')}/√Hz" for row in missing.rows])
     axes = Axes(f"spectral density [{units}]", "frequency [Hz]", height=250, log_x=True, log_y=True)
     return figure([plot(axes, curves)], [Key(missing.rows[i], f"k{i % 6}") for i in order])
+
+
+def torque_spectrum(times: Array, torque: Array) -> tuple[Array, Array]:
+    """Spectral density of each column.
+
+    Args:
+        times: shape (m,) [s]; uneven ones are resampled.
+        torque: shape (m, c) [N m].
+
+    Returns:
+        Frequencies, shape (k,) [Hz], and densities, shape (k, c) [N m/√Hz], averaged in even steps of log f.
+    """
+    if len(times) < 16:
+        return np.zeros(0), np.zeros((0, torque.shape[1]))
+    step = float(np.median(np.diff(times)))
+    even = np.arange(times[0], times[-1], step)
+    values = np.column_stack([np.interp(even, times, column) for column in torque.T])
+    length = min(len(even), max(round(SEGMENT / step), 16))
+    f, power = welch(values, 1.0 / step, nperseg=length, axis=0)
+    return _averaged(f[1:], power[1:])
+
+
+def _averaged(f: Array, power: Array) -> tuple[Array, Array]:
+    edges = np.geomspace(f[0] * 0.999, f[-1] * 1.001, POINTS + 1)
+    place = np.digitize(f, edges) - 1
+    bins = np.unique(place)
+    frequency = np.array([float(np.mean(f[place == k])) for k in bins])
+    return frequency, np.sqrt(np.array([np.mean(power[place == k], axis=0) for k in bins]))
