@@ -99,11 +99,24 @@ def _parser(arguments: Sequence[str]) -> argparse.ArgumentParser:
     for name, summary in verbs().items():
         if name == asked_for:
             parser.verb = f" {name}"
-            module = name.replace("-", "_")
-            importlib.import_module(f"jointscope.tools.verbs.{module}").add_parser(subparsers)
+            add_verb(subparsers, name)
         else:
             subparsers.add_parser(name, help=summary)
     return parser
+
+
+def add_verb(subparsers: Any, name: str) -> None:
+    """Adds a verb with all that it takes."""
+    module = importlib.import_module(f"jointscope.tools.verbs.{name.replace('-', '_')}")
+    parser = subparsers.add_parser(
+        name,
+        help=verbs()[name],
+        description=module.DESCRIPTION,
+        epilog=module.EXAMPLE,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    parser.set_defaults(run=module.run)
+    module.add_arguments(parser)
 
 
 @functools.cache

@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The verbs of the command line, one per file: `add_parser(subparsers)` and `run(args) -> int`."""
+"""The verbs of the command line, one per file: DESCRIPTION, EXAMPLE, `add_arguments(parser)`, `run(args) -> int`."""

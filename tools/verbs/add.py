@@ -4,11 +4,11 @@
 from __future__ import annotations
 
 import argparse
-from typing import Any
 
 from jointscope.tools.terminal.text_table import text_table
 from jointscope.tools.verb_parts.edited_robot import add_edit_arguments, edit_robot, notes, only_in
 
+DESCRIPTION = "Adds one or more physical effects to a robot file; comments of the file survive."
 EXAMPLE = """example:
   jointscope add doggy bearing_flexibility@joint1 -o doggy_bearing.yaml
   jointscope calibrate doggy_bearing.yaml train.mcap -o doggy_calibrated.yaml
@@ -18,17 +18,9 @@ ID@* means everything that the effect can act on. A joint declared rigid gets th
 `jointscope effects` lists the effects, `jointscope diagnose` tells which one is missing."""
 
 
-def add_parser(subparsers: Any) -> None:
-    """Adds the verb to the command line."""
-    parser = subparsers.add_parser(
-        "add",
-        help="adds physical effects to a robot file; calibration then finds their sizes",
-        description="Adds one or more physical effects to a robot file; comments of the file survive.",
-        epilog=EXAMPLE,
-        formatter_class=argparse.RawDescriptionHelpFormatter,
-    )
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Adds what the verb takes."""
     add_edit_arguments(parser)
-    parser.set_defaults(run=run)
 
 
 def run(args: argparse.Namespace) -> int:

@@ -30,6 +30,7 @@ from jointscope.tools.writing.whole_file import check_outputs, whole_file
 if TYPE_CHECKING:
     from jointscope.robots.model.robot import Robot
 
+DESCRIPTION = "Finds the parameters of a robot from recordings, with their uncertainties."
 EXAMPLE = """example:
   jointscope calibrate doggy calibration.mcap -o doggy_calibrated.yaml --report report.html --rrd run.rrd
   jointscope calibrate tx90l --poses poses.csv -o arm.yaml --urdf arm.urdf --report arm.html
@@ -42,15 +43,8 @@ Several bags share all parameters; each has its own states and gyro biases. The 
 takes as ROBOT."""
 
 
-def add_parser(subparsers: Any) -> None:
-    """Adds the verb to the command line."""
-    parser = subparsers.add_parser(
-        "calibrate",
-        help="batch calibration; OUT.yaml is a robot file again, with sigmas and provenance",
-        description="Finds the parameters of a robot from recordings, with their uncertainties.",
-        epilog=EXAMPLE,
-        formatter_class=argparse.RawDescriptionHelpFormatter,
-    )
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Adds what the verb takes."""
     parser.add_argument("robot", metavar="ROBOT", help="name of a ready robot, or a robot file")
     parser.add_argument("bags", metavar="BAG", nargs="*", type=Path, help=".bag, .mcap, .db3 or a ROS 2 bag folder")
     parser.add_argument("-o", "--output", metavar="OUT.yaml", type=Path, required=True, help="robot file to write")
@@ -73,7 +67,6 @@ def add_parser(subparsers: Any) -> None:
     add_leave_out_option(parser)
     add_effects_option(parser)
     add_result_options(parser)
-    parser.set_defaults(run=run)
 
 
 def run(args: argparse.Namespace) -> int:

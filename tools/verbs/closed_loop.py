@@ -6,7 +6,6 @@ from __future__ import annotations
 import argparse
 import sys
 from pathlib import Path
-from typing import Any
 
 from jointscope.robots.errors import SimulationError
 from jointscope.tools.closed_loop.closed_loop_result import CONTROLLERS, SOURCES
@@ -17,6 +16,11 @@ from jointscope.tools.verb_parts.simulation_options import add_simulation_option
 from jointscope.tools.verb_parts.user_effects import add_effects_option, load_user_effects
 from jointscope.tools.writing.whole_file import check_outputs, write_json
 
+DESCRIPTION = (
+    "Lets the P-controller of Doggy's paper and a state feedback hit balls in MuJoCo, or the six "
+    "controllers of the BioRob make far moves, each fed by the true "
+    "state, by the fixed-lag estimator and by differentiated encoders."
+)
 EXAMPLE = """example:
   jointscope closed-loop doggy --seed 3 --friction smooth --report loop.html
   jointscope closed-loop biorob --sources true,encoders
@@ -26,17 +30,9 @@ ROBOT is the simulated truth; controllers and estimator know the model only. The
 `jointscope simulate`, so a model can be calibrated from a recording of the very robot that it then controls."""
 
 
-def add_parser(subparsers: Any) -> None:
-    """Adds the verb to the command line."""
-    parser = subparsers.add_parser(
-        "closed-loop",
-        help="ball hitting in the simulator, tracking errors with and without the estimator",
-        description="Lets the P-controller of Doggy's paper and a state feedback hit balls in MuJoCo, or the six "
-        "controllers of the BioRob make far moves, each fed by the true "
-        "state, by the fixed-lag estimator and by differentiated encoders.",
-        epilog=f"{EXAMPLE}\n\n{effect_list()}",
-        formatter_class=argparse.RawDescriptionHelpFormatter,
-    )
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Adds what the verb takes."""
+    parser.epilog = f"{EXAMPLE}\n\n{effect_list()}"
     parser.add_argument("robot", metavar="ROBOT", help="name of a ready robot, or a robot file: the truth")
     parser.add_argument(
         "--model",
@@ -80,7 +76,6 @@ def add_parser(subparsers: Any) -> None:
     add_simulation_options(parser)
     add_effects_option(parser)
     add_result_options(parser)
-    parser.set_defaults(run=run)
 
 
 def run(args: argparse.Namespace) -> int:

@@ -22,6 +22,7 @@ from jointscope.tools.verb_parts.result_files import ResultFiles, add_result_opt
 from jointscope.tools.verb_parts.user_effects import add_effects_option, load_user_effects
 from jointscope.tools.writing.whole_file import check_outputs, write_json
 
+DESCRIPTION = "Predicts a recording with one or more models and shows where and when they fail."
 EXAMPLE = """example:
   jointscope compare doggy doggy_calibrated.yaml moves.mcap --report comparison.html
 
@@ -31,20 +32,12 @@ With poses or frequency responses:
   jointscope compare tx90l arm.yaml --frequency frequency_P2 --report matrix.html"""
 
 
-def add_parser(subparsers: Any) -> None:
-    """Adds the verb to the command line."""
-    parser = subparsers.add_parser(
-        "compare",
-        help="measured against predicted: error per channel and horizon, where and when it fails",
-        description="Predicts a recording with one or more models and shows where and when they fail.",
-        epilog=EXAMPLE,
-        formatter_class=argparse.RawDescriptionHelpFormatter,
-    )
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Adds what the verb takes."""
     add_models_and_bag(parser)
     add_kind_options(parser)
     add_accept_option(parser)
     add_result_options(parser)
-    parser.set_defaults(run=run)
 
 
 def add_models_and_bag(parser: argparse.ArgumentParser) -> None:

@@ -7,25 +7,20 @@ import argparse
 import os
 import tempfile
 from pathlib import Path
-from typing import Any
 
 from jointscope.robots.errors import JointscopeError
 from jointscope.tools.writing.whole_file import check_outputs, write_json
 
+DESCRIPTION = (
+    "Simulates recordings of a robot with a soft bearing, lets `discover` find what the model lacks,\n"
+    "checks the result against the truth, and writes everything into a folder. Takes two minutes."
+)
 EXAMPLE = """example:
   jointscope demo -o demo"""
 
 
-def add_parser(subparsers: Any) -> None:
-    """Adds the verb to the command line."""
-    parser = subparsers.add_parser(
-        "demo",
-        help="the whole story on a simulated Doggy with a soft bearing, from bag to report",
-        description="Simulates recordings of a robot with a soft bearing, lets `discover` find what the model lacks,\n"
-        "checks the result against the truth, and writes everything into a folder. Takes two minutes.",
-        epilog=EXAMPLE,
-        formatter_class=argparse.RawDescriptionHelpFormatter,
-    )
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Adds what the verb takes."""
     parser.add_argument("-o", "--output", metavar="DIR", type=Path, default=Path("demo"), help="folder; default demo")
     parser.add_argument("--seconds", metavar="S", type=float, default=14.0, help="of the training recording [s]")
     parser.add_argument("--seed", metavar="N", type=int, default=1, help="of the simulated robot; default 1")
@@ -36,7 +31,6 @@ def add_parser(subparsers: Any) -> None:
         help="hide this effect instead of the soft bearing; may be repeated",
     )
     parser.add_argument("--json", type=Path, metavar="FILE", help="write what was found as JSON")
-    parser.set_defaults(run=run)
 
 
 def run(args: argparse.Namespace) -> int:

@@ -4,7 +4,6 @@
 from __future__ import annotations
 
 import argparse
-from typing import Any
 
 from jointscope.robots.errors import RobotError
 from jointscope.tools.terminal.progress import progress_bar
@@ -17,6 +16,7 @@ from jointscope.tools.verb_parts.user_effects import load_user_effects
 from jointscope.tools.verb_parts.workers import add_workers_option, check_one_choice, check_workers, workers_of
 from jointscope.tools.writing.whole_file import check_outputs
 
+DESCRIPTION = "Shows where a model fails and ranks the physical effects that it may lack."
 EXAMPLE = """example:
   jointscope diagnose doggy train.mcap --holdout test.mcap --report diagnosis.html
   jointscope diagnose biorob --rests spring1 spring2 gravity --report diagnosis.html
@@ -35,20 +35,12 @@ REST_LIMITS = (
 )
 
 
-def add_parser(subparsers: Any) -> None:
-    """Adds the verb to the command line."""
-    parser = subparsers.add_parser(
-        "diagnose",
-        help="ranks the physical effects that a model lacks, each with its evidence",
-        description="Shows where a model fails and ranks the physical effects that it may lack.",
-        epilog=EXAMPLE,
-        formatter_class=argparse.RawDescriptionHelpFormatter,
-    )
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Adds what the verb takes."""
     add_bag_arguments(parser)
     add_workers_option(parser)
     add_accept_option(parser)
     add_result_options(parser)
-    parser.set_defaults(run=run)
 
 
 def run(args: argparse.Namespace) -> int:

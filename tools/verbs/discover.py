@@ -23,6 +23,11 @@ from jointscope.tools.writing.whole_file import check_outputs
 if TYPE_CHECKING:
     from jointscope.graphs.discovery.side_by_side import SideBySide
 
+DESCRIPTION = (
+    "Finds the physical effects that a model lacks and adds them one by one. An effect is chosen on\n"
+    "blocks of the training recordings that its first fit leaves out; it stays if the error on the training\n"
+    "recordings also falls when the model is calibrated with all of them. The held-out recording is only scored."
+)
 EXAMPLE = """example:
   jointscope discover doggy train.mcap --holdout test.mcap -o found.yaml --report discovery.html
   jointscope discover biorob --rests spring1 spring2 gravity --holdout-rests spring3 -o found.yaml
@@ -35,23 +40,13 @@ after the last finished step; found.discovery.json remembers what it started fro
 MOST_STEPS = 12  # of robots with free links, whose sensors show one effect for each joint and gyro
 
 
-def add_parser(subparsers: Any) -> None:
-    """Adds the verb to the command line."""
-    parser = subparsers.add_parser(
-        "discover",
-        help="calibrates, diagnoses, adds what is missing, and repeats until nothing helps",
-        description="Finds the physical effects that a model lacks and adds them one by one. An effect is chosen on\n"
-        "blocks of the training recordings that its first fit leaves out; it stays if the error on the training\n"
-        "recordings also falls when the model is calibrated with all of them. The held-out recording is only scored.",
-        epilog=EXAMPLE,
-        formatter_class=argparse.RawDescriptionHelpFormatter,
-    )
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Adds what the verb takes."""
     add_bag_arguments(parser)
     parser.add_argument("-o", "--output", metavar="OUT.yaml", type=Path, required=True, help="robot file to write")
     add_workers_option(parser)
     parser.add_argument("--restart", action="store_true", help="ignore the steps of an earlier run")
     add_result_options(parser)
-    parser.set_defaults(run=run)
 
 
 def run(args: argparse.Namespace) -> int:

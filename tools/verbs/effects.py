@@ -6,7 +6,7 @@ from __future__ import annotations
 import argparse
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from jointscope.tools.verb_parts.user_effects import add_effects_option, load_user_effects
 from jointscope.tools.writing.whole_file import check_outputs, whole_file, write_json
@@ -16,6 +16,10 @@ if TYPE_CHECKING:
 
 PICTURES = "pictures/effects"
 """Folder of the drawings, beside the page of the catalogue."""
+DESCRIPTION = (
+    "Lists the catalogue of physical effects. With an id, prints the card of that effect: equation\n"
+    "and parameters, the motion that shows it, and what it is easily confused with."
+)
 EXAMPLE = """examples:
   jointscope effects
   jointscope effects bearing_flexibility
@@ -24,16 +28,8 @@ EXAMPLE = """examples:
 docs/your_own_effect.md shows how to write an effect of your own."""
 
 
-def add_parser(subparsers: Any) -> None:
-    """Adds the verb to the command line."""
-    parser = subparsers.add_parser(
-        "effects",
-        help="lists the physical effects that a model may lack, or prints the card of one",
-        description="Lists the catalogue of physical effects. With an id, prints the card of that effect: equation\n"
-        "and parameters, the motion that shows it, and what it is easily confused with.",
-        epilog=EXAMPLE,
-        formatter_class=argparse.RawDescriptionHelpFormatter,
-    )
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Adds what the verb takes."""
     parser.add_argument("id", metavar="ID", nargs="?", help="an effect")
     add_effects_option(parser)
     parser.add_argument(
@@ -43,7 +39,6 @@ def add_parser(subparsers: Any) -> None:
         help=f"write the catalogue as a page of markdown; drawings of laws and of signatures go to {PICTURES}",
     )
     parser.add_argument("--json", type=Path, metavar="FILE", help="write the result as JSON")
-    parser.set_defaults(run=run)
 
 
 def run(args: argparse.Namespace) -> int:

@@ -5,10 +5,10 @@ from __future__ import annotations
 
 import argparse
 from pathlib import Path
-from typing import Any
 
 from jointscope.tools.verb_parts.user_effects import add_effects_option, load_user_effects
 
+DESCRIPTION = "Writes a calibrated robot for other programs, and says what their formats cannot hold."
 EXAMPLE = """example:
   jointscope export arm_calibrated.yaml --urdf arm_calibrated.urdf --mjcf arm.xml
 
@@ -17,21 +17,13 @@ model has springs, rotors and drives as well. Values that a format cannot hold a
 programs may refuse in the file."""
 
 
-def add_parser(subparsers: Any) -> None:
-    """Adds the verb to the command line."""
-    parser = subparsers.add_parser(
-        "export",
-        help="writes a calibrated robot as URDF or MuJoCo model",
-        description="Writes a calibrated robot for other programs, and says what their formats cannot hold.",
-        epilog=EXAMPLE,
-        formatter_class=argparse.RawDescriptionHelpFormatter,
-    )
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Adds what the verb takes."""
     parser.add_argument("robot", metavar="ROBOT", help="name of a ready robot, or a robot file")
     parser.add_argument("--urdf", type=Path, metavar="F.urdf", help="write a URDF")
     parser.add_argument("--mjcf", type=Path, metavar="F.xml", help="write a MuJoCo model")
     add_effects_option(parser)
     parser.add_argument("--json", type=Path, metavar="FILE", help="write the result as JSON")
-    parser.set_defaults(run=run)
 
 
 def run(args: argparse.Namespace) -> int:

@@ -6,13 +6,13 @@ from __future__ import annotations
 import argparse
 from contextlib import ExitStack
 from pathlib import Path
-from typing import Any
 
 from jointscope.robots.errors import RecordingError
 from jointscope.tools.terminal.progress import progress_bar
 from jointscope.tools.verb_parts.result_files import ResultFiles, add_result_options, write_report
 from jointscope.tools.writing.whole_file import check_outputs, whole_file, write_json
 
+DESCRIPTION = "Estimates frequency responses from recordings of periodic excitation, one for each bag."
 EXAMPLE = """example:
   jointscope frequency frequency_P1 frequency_P3 --report frf.html
   jointscope frequency bench.mcap --from /drive:effort --to /joint_states:velocity:motor,load -o frf.npz
@@ -20,15 +20,8 @@ EXAMPLE = """example:
 How it was excited is read from excitation.yaml beside the bag, or found from the recording (docs/frequency.md)."""
 
 
-def add_parser(subparsers: Any) -> None:
-    """Adds the verb to the command line."""
-    parser = subparsers.add_parser(
-        "frequency",
-        help="frequency response matrix of any system, with noise and total covariance",
-        description="Estimates frequency responses from recordings of periodic excitation, one for each bag.",
-        epilog=EXAMPLE,
-        formatter_class=argparse.RawDescriptionHelpFormatter,
-    )
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Adds what the verb takes."""
     parser.add_argument("bags", metavar="BAG", nargs="+", type=Path, help="a .bag, .mcap, .db3 or a ROS 2 bag folder")
     parser.add_argument("-o", "--output", metavar="FILE", type=Path, help="write the matrices as .npz or .csv")
     parser.add_argument(
@@ -48,7 +41,6 @@ def add_parser(subparsers: Any) -> None:
         help="describes the excitation; default: excitation.yaml beside the bag",
     )
     add_result_options(parser, viewer=False)
-    parser.set_defaults(run=run)
 
 
 def run(args: argparse.Namespace) -> int:

@@ -5,12 +5,12 @@ from __future__ import annotations
 
 import argparse
 from pathlib import Path
-from typing import Any
 
 from jointscope.tools.terminal.progress import progress_bar, reading
 from jointscope.tools.verb_parts.user_effects import add_effects_option, load_user_effects
 from jointscope.tools.writing.whole_file import check_outputs, write_json
 
+DESCRIPTION = "Describes a bag; with --robot it also says whether that robot can use it, and why not."
 EXAMPLE = """example:
   jointscope info calibration.mcap
   jointscope info calibration.mcap --robot doggy --json info.json
@@ -18,20 +18,12 @@ EXAMPLE = """example:
 The exit code is 0 even if the robot cannot use the bag; see the text, or `usable` in the JSON."""
 
 
-def add_parser(subparsers: Any) -> None:
-    """Adds the verb to the command line."""
-    parser = subparsers.add_parser(
-        "info",
-        help="topics, rates, gaps, jitter, clipping; what the robot file needs and what is there",
-        description="Describes a bag; with --robot it also says whether that robot can use it, and why not.",
-        epilog=EXAMPLE,
-        formatter_class=argparse.RawDescriptionHelpFormatter,
-    )
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Adds what the verb takes."""
     parser.add_argument("bag", metavar="BAG", type=Path, help="a .bag, .mcap, .db3 or a ROS 2 bag folder")
     parser.add_argument("--robot", metavar="ROBOT", help="name of a ready robot, or a robot file")
     add_effects_option(parser)
     parser.add_argument("--json", type=Path, metavar="FILE", help="write the result as JSON")
-    parser.set_defaults(run=run)
 
 
 def run(args: argparse.Namespace) -> int:

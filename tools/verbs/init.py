@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from jointscope.tools.init.streams.named_signal import Wish
     from jointscope.tools.init.streams.other_joints import Typed
 
+DESCRIPTION = "Writes a robot file for a robot of your own."
 EXAMPLE = """example:
   jointscope init arm.urdf moves.mcap -o arm.yaml
   jointscope info moves.mcap --robot arm.yaml
@@ -29,15 +30,8 @@ mounting of each gyroscope, the noise of the sensors, and, by regression, gravit
 drives, which it prints as a table with sigmas. Every guess is in the file, with its reason."""
 
 
-def add_parser(subparsers: Any) -> None:
-    """Adds the verb to the command line."""
-    parser = subparsers.add_parser(
-        "init",
-        help="writes a first robot file from a URDF and a bag, and marks what it guessed",
-        description="Writes a robot file for a robot of your own.",
-        epilog=EXAMPLE,
-        formatter_class=argparse.RawDescriptionHelpFormatter,
-    )
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Adds what the verb takes."""
     parser.add_argument("urdf", metavar="URDF", type=Path, help="bodies and joints of the robot")
     parser.add_argument("bag", metavar="BAG", type=Path, help="a .bag, .mcap, .db3 or a ROS 2 bag folder")
     parser.add_argument("-o", "--output", metavar="ROBOT", type=Path, required=True, help="robot file to write")
@@ -66,7 +60,6 @@ def add_parser(subparsers: Any) -> None:
         help="topic with positions of a point on this link, from a camera or motion capture; may be repeated",
     )
     parser.add_argument("--json", type=Path, metavar="FILE", help="write the guesses as JSON")
-    parser.set_defaults(run=run)
 
 
 def run(args: argparse.Namespace) -> int:

@@ -4,10 +4,10 @@
 from __future__ import annotations
 
 import argparse
-from typing import Any
 
 from jointscope.tools.verb_parts.edited_robot import add_edit_arguments, edit_robot, notes, only_in
 
+DESCRIPTION = "Removes one or more physical effects from a robot file; comments of the file survive."
 EXAMPLE = """example:
   jointscope remove doggy_bearing.yaml bearing_flexibility@joint1 -o doggy_rigid.yaml
   jointscope remove arm.yaml 'motor_viscous@*' cogging@elbow -o arm_plain.yaml
@@ -16,17 +16,9 @@ ID@* means that effect wherever the robot has it. The other parameters keep thei
 were found beside the effect."""
 
 
-def add_parser(subparsers: Any) -> None:
-    """Adds the verb to the command line."""
-    parser = subparsers.add_parser(
-        "remove",
-        help="takes physical effects out of a robot file, with all their parameters",
-        description="Removes one or more physical effects from a robot file; comments of the file survive.",
-        epilog=EXAMPLE,
-        formatter_class=argparse.RawDescriptionHelpFormatter,
-    )
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Adds what the verb takes."""
     add_edit_arguments(parser)
-    parser.set_defaults(run=run)
 
 
 def run(args: argparse.Namespace) -> int:

@@ -7,7 +7,7 @@ import argparse
 import math
 from contextlib import ExitStack
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from jointscope.robots.errors import RecordingError, SolveError
 from jointscope.tools.terminal.progress import progress_bar
@@ -23,6 +23,7 @@ if TYPE_CHECKING:
     from jointscope.tools.terminal.progress import Progress
 
 BATCH_SECONDS = 120.0  # longer recordings are compared with the batch smoother only on request
+DESCRIPTION = "Feeds a recording to the estimator of the control loop and shows states, residuals and latency."
 EXAMPLE = """example:
   jointscope replay doggy_calibrated.yaml run.mcap --lag 0.1 --rrd run.rrd --report run.html
 
@@ -30,15 +31,8 @@ Messages come in the order and at the times at which they were received, includi
 -o the states go to a table, one row per command. With --live the viewer shows them while they are estimated."""
 
 
-def add_parser(subparsers: Any) -> None:
-    """Adds the verb to the command line."""
-    parser = subparsers.add_parser(
-        "replay",
-        help="the fixed-lag estimator over a recording, message by message as in the control loop",
-        description="Feeds a recording to the estimator of the control loop and shows states, residuals and latency.",
-        epilog=EXAMPLE,
-        formatter_class=argparse.RawDescriptionHelpFormatter,
-    )
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Adds what the verb takes."""
     parser.add_argument("robot", metavar="ROBOT", help="name of a ready robot, or a robot file")
     parser.add_argument("bag", metavar="BAG", type=Path, help=".bag, .mcap, .db3 or a ROS 2 bag folder")
     parser.add_argument("--lag", metavar="S", type=_positive, default=0.1, help="length of the window [s]; default 0.1")
@@ -69,7 +63,6 @@ def add_parser(subparsers: Any) -> None:
     )
     add_effects_option(parser)
     add_result_options(parser)
-    parser.set_defaults(run=run)
 
 
 def run(args: argparse.Namespace) -> int:

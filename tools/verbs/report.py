@@ -5,26 +5,24 @@ from __future__ import annotations
 
 import argparse
 from pathlib import Path
-from typing import Any
 
 from jointscope.tools.verbs import compare
 
+DESCRIPTION = "Writes the report of `jointscope compare`."
 EXAMPLE = """example:
   jointscope report doggy doggy_calibrated.yaml moves.mcap -o comparison.html
 
 `calibrate`, `diagnose` and `discover` write reports of their own: `jointscope diagnose ... --report F.html`."""
 
 
-def add_parser(subparsers: Any) -> None:
-    """Adds the verb to the command line."""
-    parser = subparsers.add_parser(
-        "report",
-        help="how well models predict a recording, as one page for the browser",
-        description="Writes the report of `jointscope compare`.",
-        epilog=EXAMPLE,
-        formatter_class=argparse.RawDescriptionHelpFormatter,
-    )
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Adds what the verb takes."""
     compare.add_models_and_bag(parser)
     parser.add_argument("-o", "--output", dest="report", metavar="F.html", type=Path, required=True, help="the report")
     parser.add_argument("--json", type=Path, metavar="FILE", help="write the result as JSON")
-    parser.set_defaults(run=compare.run, rrd=None, figures=None)
+    parser.set_defaults(rrd=None, figures=None)
+
+
+def run(args: argparse.Namespace) -> int:
+    """Does what `jointscope compare` does."""
+    return compare.run(args)

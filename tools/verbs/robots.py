@@ -5,29 +5,21 @@ from __future__ import annotations
 
 import argparse
 from pathlib import Path
-from typing import Any
 
 from jointscope.robots.errors import RobotError
 from jointscope.tools.terminal.text_table import text_table
 from jointscope.tools.writing.whole_file import check_outputs, write_json
 
+DESCRIPTION = "Lists the ready robots. With a name: prints its file, a start for your own robot."
 EXAMPLE = """examples:
   jointscope robots
   jointscope robots doggy > my_robot.yaml"""
 
 
-def add_parser(subparsers: Any) -> None:
-    """Adds the verb to the command line."""
-    parser = subparsers.add_parser(
-        "robots",
-        help="lists the ready robots, or prints the file of one",
-        description="Lists the ready robots. With a name: prints its file, a start for your own robot.",
-        epilog=EXAMPLE,
-        formatter_class=argparse.RawDescriptionHelpFormatter,
-    )
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Adds what the verb takes."""
     parser.add_argument("name", metavar="NAME", nargs="?", help="a ready robot")
     parser.add_argument("--json", type=Path, metavar="FILE", help="write the result as JSON")
-    parser.set_defaults(run=run)
 
 
 def run(args: argparse.Namespace) -> int:

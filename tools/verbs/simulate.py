@@ -21,6 +21,7 @@ from jointscope.tools.verb_parts.simulations.shaken import add_shaking_options, 
 from jointscope.tools.verb_parts.user_effects import add_effects_option, load_user_effects
 from jointscope.tools.writing.whole_file import check_outputs, whole_file, write_json
 
+DESCRIPTION = "Simulates a robot with MuJoCo and writes a bag and the truth beside it."
 EXAMPLE = """example:
   jointscope simulate doggy -o train.mcap --seed 3 --friction smooth --effect bearing_flexibility@joint1
   jointscope simulate doggy -o test.mcap --motion moves --seed 3 --friction smooth --effect bearing_flexibility@joint1
@@ -30,15 +31,9 @@ EXAMPLE = """example:
 The same seed gives the same robot; the truth is written beside the bag as train.truth.json."""
 
 
-def add_parser(subparsers: Any) -> None:
-    """Adds the verb to the command line."""
-    parser = subparsers.add_parser(
-        "simulate",
-        help="a recording from an engine that is independent of the estimator's own model",
-        description="Simulates a robot with MuJoCo and writes a bag and the truth beside it.",
-        epilog=f"{EXAMPLE}\n\n{effect_list()}",
-        formatter_class=argparse.RawDescriptionHelpFormatter,
-    )
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Adds what the verb takes."""
+    parser.epilog = f"{EXAMPLE}\n\n{effect_list()}"
     defaults = ", ".join(f"{seconds:g} for {motion}" for motion, seconds in DEFAULT_SECONDS.items())
     parser.add_argument("robot", metavar="ROBOT", help="name of a ready robot, or a robot file")
     parser.add_argument(
@@ -68,7 +63,6 @@ def add_parser(subparsers: Any) -> None:
     add_simulation_options(parser)
     add_effects_option(parser)
     parser.add_argument("--json", type=Path, metavar="FILE", help="write the result as JSON")
-    parser.set_defaults(run=run)
 
 
 def run(args: argparse.Namespace) -> int:

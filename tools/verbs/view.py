@@ -7,11 +7,11 @@ import argparse
 import subprocess
 import sys
 from pathlib import Path
-from typing import Any
 
 from jointscope.robots.errors import JointscopeError, RecordingError
 from jointscope.robots.outside_modules import need_module
 
+DESCRIPTION = "Opens an .rrd file, as the other verbs write it with --rrd, in the rerun viewer."
 EXAMPLE = """example:
   jointscope calibrate doggy calibration.mcap -o doggy_calibrated.yaml --rrd run.rrd
   jointscope view run.rrd"""
@@ -19,17 +19,9 @@ EXAMPLE = """example:
 MAGIC = (b"RRF2", b"RRF1", b"RRF0")  # first bytes of the viewer's files
 
 
-def add_parser(subparsers: Any) -> None:
-    """Adds the verb to the command line."""
-    parser = subparsers.add_parser(
-        "view",
-        help="opens an .rrd file in the rerun viewer",
-        description="Opens an .rrd file, as the other verbs write it with --rrd, in the rerun viewer.",
-        epilog=EXAMPLE,
-        formatter_class=argparse.RawDescriptionHelpFormatter,
-    )
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Adds what the verb takes."""
     parser.add_argument("file", metavar="F.rrd", type=Path, help="file to open")
-    parser.set_defaults(run=run)
 
 
 def run(args: argparse.Namespace) -> int:

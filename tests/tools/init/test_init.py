@@ -19,10 +19,10 @@ from jointscope.robots.recordings.screening import screen
 from jointscope.tools.bags.read_arrivals import ArrivalReader
 from jointscope.tools.bags.read_recording import read_recording
 from jointscope.tools.bags.write_bag import write_bag
+from jointscope.tools.command_line import add_verb
 from jointscope.tools.init.robot_guess import guess_robot
 from jointscope.tools.init.streams.other_joints import Typed
 from jointscope.tools.init.streams.sensor_noise import guess_noise
-from jointscope.tools.verbs import init
 from jointscope.tools.verdicts.judgement import judge
 
 REAL = Path(__file__).resolve().parents[3].parent / "shared" / "data" / "real"
@@ -84,7 +84,7 @@ def bag(doggy, tmp_path_factory):
 
 def run(*arguments):
     parser = argparse.ArgumentParser()
-    init.add_parser(parser.add_subparsers())
+    add_verb(parser.add_subparsers(), "init")
     args = parser.parse_args(["init", *map(str, arguments)])
     return args.run(args)
 

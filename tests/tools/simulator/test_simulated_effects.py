@@ -10,13 +10,13 @@ import pytest
 from jointscope.robots.errors import EffectError
 from jointscope.robots.files.robot_file import load_robot
 from jointscope.robots.model.robot import Robot
+from jointscope.tools.command_line import add_verb
 from jointscope.tools.simulator import simulate
 from jointscope.tools.simulator.effect_list import effect_list
 from jointscope.tools.simulator.effects import make_effect, simulated_effects
 from jointscope.tools.simulator.truth import true_robot
 from jointscope.tools.simulator.world.effect import SimulatedEffect, owners_of
 from jointscope.tools.simulator.world.not_simulated import NOT_SIMULATED
-from jointscope.tools.verbs.simulate import add_parser
 
 pytest.importorskip("mujoco", reason="the simulator needs the extra jointscope[sim]")
 
@@ -221,7 +221,7 @@ def test_all_effects_of_all_kinds_run_together(plain):
 
 def test_help_lists_every_effect_once(capsys):
     parser = argparse.ArgumentParser()
-    add_parser(parser.add_subparsers())
+    add_verb(parser.add_subparsers(), "simulate")
     with pytest.raises(SystemExit):
         parser.parse_args(["simulate", "--help"])
     words = capsys.readouterr().out.split("effects of the catalogue, by owner:")[1].replace(",", " ").split()

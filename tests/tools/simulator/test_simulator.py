@@ -16,7 +16,7 @@ from jointscope.robots.errors import EffectError, JointscopeError, RobotError, S
 from jointscope.robots.files.robot_file import load_robot
 from jointscope.robots.model.robot import Robot
 from jointscope.tools.bags.read_recording import read_recording
-from jointscope.tools.command_line import main
+from jointscope.tools.command_line import add_verb, main
 from jointscope.tools.simulator import Disturbance, simulate
 from jointscope.tools.simulator.effects import make_effect, simulated_effects
 from jointscope.tools.simulator.loop.controller import GAIN
@@ -24,7 +24,6 @@ from jointscope.tools.simulator.truth import true_robot
 from jointscope.tools.simulator.world.effect import SimulatedEffect
 from jointscope.tools.simulator.world.engine import TICK, Engine
 from jointscope.tools.simulator.world.trajectory import Trajectory
-from jointscope.tools.verbs.simulate import add_parser
 
 pytest.importorskip("mujoco", reason="the simulator needs the extra jointscope[sim]")
 
@@ -375,7 +374,7 @@ def test_without_mujoco_the_message_says_what_to_install(doggy, monkeypatch):
 
 def verb(*words: str) -> int:
     parser = argparse.ArgumentParser()
-    add_parser(parser.add_subparsers())
+    add_verb(parser.add_subparsers(), "simulate")
     arguments = parser.parse_args(["simulate", *words])
     return arguments.run(arguments)
 

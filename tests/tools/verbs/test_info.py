@@ -15,7 +15,7 @@ from jointscope.robots.recordings.recording import Recording, Stream
 from jointscope.tools.bags.describe_bag import describe_bag
 from jointscope.tools.bags.needed_streams import needed_streams
 from jointscope.tools.bags.write_bag import write_bag
-from jointscope.tools.verbs import info
+from jointscope.tools.command_line import add_verb
 
 SHARED = Path(__file__).resolve().parents[3].parent / "shared"
 REAL_BAGS = ("hebi_arms_mit/arm2_ps1_star_trace", "kr300/traj_A", "bam_xl330/kp100_sin_sin", "hebi_example/exampleLog")
@@ -45,7 +45,7 @@ def bag(doggy, tmp_path):
 
 def run(*arguments):
     parser = argparse.ArgumentParser()
-    info.add_parser(parser.add_subparsers())
+    add_verb(parser.add_subparsers(), "info")
     args = parser.parse_args(["info", *map(str, arguments)])
     return args.run(args)
 
