@@ -117,7 +117,7 @@ def derived_results(robot: Robot, calibration: Calibration, covariance: Array) -
         calibration: the values that were found.
         covariance: of the shared values, whose first ones are the free parameters' coordinates, shape (s, s).
     """
-    before = {name: p.value for name, p in robot.parameters.items()}
+    before = robot.values
     now = before | dict(zip(calibration.names, calibration.values.tolist(), strict=True))
     count = len(calibration.names)
     scale = np.asarray(calibration.value_by_coordinate)

@@ -40,7 +40,7 @@ class Predictor:
         self._model = RatesOfMany(robot)
         self._euler = robot.choices.integrator == "euler"
         path = CommandPath(timeline.ticks, timeline.u, robot.effects, robot.joints, not robot.command_held)
-        self._h, u = timeline.h, path.acting({name: p.value for name, p in robot.parameters.items()})[0]
+        self._h, u = timeline.h, path.acting(robot.values)[0]
         self._torque = self._model.torque_of(u)
         self._cuts = StepCuts(robot, h)
 

@@ -135,7 +135,7 @@ def _groups(problem: BagProblem) -> list[_Group]:
         stamps = problem.recording.streams[name].times
         for channels, late in late_channels(problem.robot, name):
             lateness = Lateness.of(problem.robot, late, stamps)
-            variance = lateness.variance({name: p.value for name, p in problem.robot.parameters.items()})[0]
+            variance = lateness.variance(problem.robot.values)[0]
             taken = stamps - lateness.anchor
             found.append(_Group(name, channels, taken, isinstance(sensor, Accelerometer), variance))
     return found

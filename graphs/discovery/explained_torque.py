@@ -46,7 +46,7 @@ def explained_torque(robot: Robot, label: str, problem: BagProblem, x: Array) ->
 def _accelerations(robot: Robot, problem: BagProblem, x: Array) -> Array:
     """Of the links and motors of all joints, shape (m, 2n) [rad/s^2]; zero for the motor of a rigid joint."""
     layout, timeline = robot.layout, problem.timeline
-    values = {name: parameter.value for name, parameter in robot.parameters.items()}
+    values = robot.values
     model = ElasticJoints(robot)
     u = CommandPath(timeline.ticks, timeline.u, robot.effects, robot.joints, not robot.command_held).acting(values)[0]
     a = model.accelerations(x, _at_ticks(u), np.array([values[name] for name in model.names]))
@@ -65,7 +65,7 @@ def spring_and_drive(problem: BagProblem, x: Array) -> tuple[Array, Array]:
         x: states of the model, shape (m, d).
     """
     robot, model = problem.robot, ElasticJoints(problem.robot)
-    values = {name: parameter.value for name, parameter in robot.parameters.items()}
+    values = robot.values
     parameters = np.array([values[name] for name in model.names])
     u = problem.dynamics.steps.acting(values)[0]
     drive = _at_ticks(u) * model.drive_gain(parameters)

@@ -231,8 +231,7 @@ class FrequencySet:
 
     def log_errors(self) -> Complex:
         """Logarithm of the model's matrix over the measured one at the robot's values, shape (l, nu, nu)."""
-        values = {name: p.value for name, p in self.robot.parameters.items()}
-        return np.asarray(np.log(self.response(values) / self.pose.matrix.G[self.pose.used]))
+        return np.asarray(np.log(self.response(self.robot.values) / self.pose.matrix.G[self.pose.used]))
 
     def logarithms(self, values: Mapping[str, float]) -> Whitened:
         """Logarithm of the model's matrix over the measured one, shape (l, nu, nu), as the balance above."""

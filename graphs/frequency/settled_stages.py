@@ -131,7 +131,7 @@ def _check_left(problems: Sequence[FrequencySet], known: Calibration) -> None:
 
 def _why(problem: FrequencySet) -> str:
     """What makes a balance explain nothing: a gap that a drive rattles in, or what the robot file says."""
-    values = {name: p.value for name, p in problem.robot.parameters.items()}
+    values = problem.robot.values
     each = dwellings(problem.pose, problem.arm.joints, values, problem.sharpness(values))
     rattling = [one for one in each if one.rattles]
     if rattling:

@@ -36,7 +36,7 @@ STEP = {"length": 1e-4, "angle": 1e-4, "mass": 1e-2, "inertia": 1e-3}  # [m], [r
 
 def first_stage(robot: Robot, pose: ShakenPose) -> FrequencySet:
     """The pose with the logarithm of its matrix."""
-    arm, values = FlexibleArm(robot), {name: p.value for name, p in robot.parameters.items()}
+    arm, values = FlexibleArm(robot), robot.values
     hardens = any(name.endswith(CUBIC) for name in values)
     m, pose = pose.matrix, replace(pose, reach=HARDENED if hardens else 1)
     relative = (m.sigmas(m.total) / np.maximum(np.abs(m.G), 1e-300))[pose.used]
@@ -87,7 +87,7 @@ def with_columns(problem: FrequencySet, robot: Robot) -> FrequencySet:
     pose, old = problem.pose, problem.stage
     assert old.x is not None
     other = FrequencySet(robot, pose, old)
-    values = {name: p.value for name, p in robot.parameters.items()}
+    values = robot.values
     parts, sharpness = other.arm.linearised(pose.q, values).mean, other.sharpness(values)
     k = motor_stiffness(other.arm, parts, pose.w, values)
     slopes = geometry_slopes(other.arm, robot, pose, set(problem.robot.parameters))
@@ -149,7 +149,7 @@ def geometry_slopes(arm: FlexibleArm, robot: Robot, pose: ShakenPose, known: Col
 
     They change by thousandths where geometry does by millimetres, so one look serves all stages.
     """
-    values = {name: p.value for name, p in robot.parameters.items()}
+    values = robot.values
     kinds = dict.fromkeys(LENGTHS, STEP["length"]) | dict.fromkeys(ANGLES, STEP["angle"])
     kinds |= {LINK_MASS: STEP["mass"], LINK_INERTIA: STEP["inertia"]}
     steps = {f"{joint}.{part}": step for joint in robot.joints for part, step in kinds.items()} | {

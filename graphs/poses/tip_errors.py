@@ -64,13 +64,6 @@ class TipErrors:
             )  # fmt: skip
         return found
 
-    @property
-    def by_pose(self) -> Array:
-        """Mean over the targets of each pose, shape (m, 3) [m]."""
-        first = np.unique(self.poses, return_index=True)[1]
-        count = np.diff(np.append(first, len(self.poses)))
-        return np.asarray(np.add.reduceat(self.vectors, first, axis=0) / count[:, None])
-
     def to_json(self) -> dict[str, float]:
         """In millimetres, and where orientations were measured in milliradians."""
         found = _sizes(1e3 * self.distances, "mm")

@@ -42,6 +42,7 @@ INTEGRATORS: dict[str, type[DynamicsFactor]] = {
     "simpson": SimpsonDynamics,
 }
 DEFLECTION_SIGMA = 0.087  # [rad] eq. (37) of the paper
+REST = 0.1  # [s] stillness from which a robot is taken to start at rest
 REST_SIGMA = 6.9259e-5  # [rad/s] eq. (37): the robot starts at rest
 MOVING_SIGMA = 20.0  # [rad/s] where it does not
 FREE = 20.0  # [rad/s / sqrt(s)] density of velocities where something unknown acts; the sensors alone tell states there
@@ -224,18 +225,18 @@ def first_command_time(recording: Recording) -> float:
     return float(command.times[moving[0]] if len(moving) else command.times[-1])
 
 
-def starts_at_rest(robot: Robot, recording: Recording, window: float = 0.1) -> bool:
-    """Whether commands are zero, encoders and gyros still for the first `window` seconds."""
+def starts_at_rest(robot: Robot, recording: Recording) -> bool:
+    """Whether commands are zero, encoders and gyros still for the first REST seconds."""
     encoder = recording.streams[robot.motor_encoder.name]
     t0 = float(max(encoder.times[0], recording.command.times[0]))
-    if first_command_time(recording) < t0 + window:
+    if first_command_time(recording) < t0 + REST:
         return False
-    part = encoder.between(t0, t0 + window)
+    part = encoder.between(t0, t0 + REST)
     if len(part) < 4:
         return False
     still = bool(np.all(_drift(part) < 4.0 * robot.motor_encoder.sigmas))
     # friction may hold the motors while the links swing: the gyros must be still, too
-    gyros = [(gyro, recording.streams[gyro.name].between(t0, t0 + window)) for gyro in robot.gyros]
+    gyros = [(gyro, recording.streams[gyro.name].between(t0, t0 + REST)) for gyro in robot.gyros]
     return still and all(
         len(part) < 6 or bool(np.all(_drift(part) < 5.0 * gyro.sigma * np.sqrt(6.0 / len(part))))
         for gyro, part in gyros

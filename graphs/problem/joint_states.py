@@ -76,7 +76,7 @@ def _by_joint(robot: Robot, x: Array) -> Array:
 def _springs(robot: Robot) -> tuple[Array, Array]:
     """Stiffness and damping of every joint, shape (n,) each; NaN where the joint has no spring."""
     parameters = JointParameters(robot)
-    values = {name: parameter.value for name, parameter in robot.parameters.items()}
+    values = robot.values
     known = [bool(parameters.source("stiffness", i)) for i in range(robot.n)]
     stiffness, damping = (np.where(known, parameters.of(values, law), np.nan) for law in ("stiffness", "damping"))
     return stiffness, damping

@@ -81,7 +81,7 @@ def place_sensor(robot: Robot, recording: Recording, timeline: Timeline, name: s
             step, fraction = timeline.locate(taken[inside])
             inner = _some(_sensor_factor(robot, recording, name, stream, inside), some, robot.sensors[name])
             here = replace(lateness, stamps=lateness.stamps[inside], anchor=lateness.anchor[inside])
-            factor = kind(inner, fraction, timeline.h[step], robot.layout, here, _values(robot))
+            factor = kind(inner, fraction, timeline.h[step], robot.layout, here, robot.values)
             placed.append(Placed(factor, step, stream.times[inside]))
     return placed
 
@@ -147,11 +147,6 @@ def _some(factor: Factor, channels: Channels, sensor: Sensor) -> Factor:
     return factor if len(channels) == len(sensor.channels) else SomeChannels(factor, channels)
 
 
-def _values(robot: Robot) -> dict[str, float]:
-    """Present values of all parameters."""
-    return {name: parameter.value for name, parameter in robot.parameters.items()}
-
-
 def _rate_of_change(stream: Stream) -> Array:
     """How fast each channel changes around each sample, shape (m, c) [unit/s]."""
     if len(stream) < 3:
@@ -191,9 +186,9 @@ def factor_on_state(robot: Robot, name: str, values: Array, times: Array) -> Fac
     if isinstance(sensor, Accelerometer):
         body = next(gyro.body for gyro in robot.gyros if gyro.name == sensor.gyro)
         seat = robot.kinematic_tree, robot.layout, body, robot.gravity_at(sensor)
-        return AccelerometerFactor(sensor, values, *seat, _values(robot))
+        return AccelerometerFactor(sensor, values, *seat, robot.values)
     if isinstance(sensor, PositionTarget):
-        return PositionTargetFactor(sensor, values, robot.kinematic_tree, robot.layout, _values(robot))
+        return PositionTargetFactor(sensor, values, robot.kinematic_tree, robot.layout, robot.values)
     if isinstance(sensor, TorqueSensor):
         return JointTorqueFactor(sensor, values, SpringTorques(robot))
     if isinstance(sensor, MotorEncoder):
@@ -208,7 +203,7 @@ def factor_on_state(robot: Robot, name: str, values: Array, times: Array) -> Fac
     effects = [here for here in robot.effects if isinstance(here.effect, ReadingEffect) and here.owner in seats]
     if not effects:
         return inner
-    return DistortedFactor(inner, tuple((here, seats[here.owner]) for here in effects), times, _values(robot))
+    return DistortedFactor(inner, tuple((here, seats[here.owner]) for here in effects), times, robot.values)
 
 
 def _nearest(times: Array, wanted: Array) -> NDArray[np.intp]:

@@ -203,7 +203,7 @@ def with_hidden_gap(robot: Robot, base: BaseModel, score: HypothesisScore | None
 def _curve_beyond(base: BaseModel, here: EffectAt, gap: tuple[float, ...]) -> dict[str, float]:
     """Stiffness and terms of the curve that give the base model's torques from the deflection beyond a gap."""
     robot = base.robot
-    values = {name: parameter.value for name, parameter in robot.parameters.items()}
+    values = robot.values
     d = np.concatenate([_deflection(robot, values, x, here.owner) for x in base.states])
     stiffness, curves = f"{here.owner}.{BEYOND[0]}", curves_of(robot, here)
     names, before = [stiffness], values[stiffness] * d

@@ -52,7 +52,7 @@ def spring_curves(problems: Sequence[RestSet], covariance: Array) -> list[Measur
         covariance: of the values of its free parameters, shape (p, p).
     """
     robot = problems[0].robot
-    values = {name: p.value for name, p in robot.parameters.items()}
+    values = robot.values
     deflections, torques = [], []
     for problem in problems:
         if problem.rests.q_link is None:
@@ -84,7 +84,7 @@ def friction_curves(problems: Sequence[RestSet], covariance: Array) -> list[Meas
     Arguments as of `spring_curves`.
     """
     robot = problems[0].robot
-    values = {name: p.value for name, p in robot.parameters.items()}
+    values = robot.values
     calibration = Calibration.of(robot)
     load, held, moved, half, sigma = [], [], [], [], []
     for problem in problems:

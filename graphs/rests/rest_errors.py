@@ -119,7 +119,7 @@ def _of(problem: RestSet) -> tuple[Array, ...]:
     columns = robot.layout.joint_link
     seen = np.zeros_like(rests.q_motor)
     if rests.q_link is not None:
-        values, q = {name: p.value for name, p in robot.parameters.items()}, predicted[:, columns]
+        values, q = robot.values, predicted[:, columns]
         seen = rests.q_link - q - encoder_errors(robot, q, values, on_links=True).value
     torques = problem.torques(measured, calibration)
     missing = np.zeros((len(rests), robot.layout.n_link))

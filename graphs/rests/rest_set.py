@@ -125,7 +125,7 @@ class RestSet:
     def start(self, common: Calibration) -> tuple[Array, Calibration]:
         """Where the encoders say."""
         robot, layout, rests = self.robot, self.robot.layout, self.rests
-        values = {name: parameter.value for name, parameter in robot.parameters.items()}
+        values = robot.values
         q_motor = true_positions(robot, rests.q_motor, values, on_links=False)
         seen = None if rests.q_link is None else true_positions(robot, rests.q_link, values, on_links=True)
         q_link = joint_angles(robot, q_motor) if seen is None else seen
@@ -175,7 +175,7 @@ class RestSet:
         if self.rests.q_link is None:
             return np.zeros_like(self.rests.q_motor)
         q = x[:, self.robot.layout.joint_link]
-        values = values or {name: parameter.value for name, parameter in self.robot.parameters.items()}
+        values = values or self.robot.values
         reading = q + encoder_errors(self.robot, q, values, on_links=True).value
         return (self.rests.q_link - reading) / self.encoder_sigmas()[1]
 

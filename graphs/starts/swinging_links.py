@@ -32,7 +32,7 @@ def swinging_links(problem: BagProblem, calibration: Calibration, q_motor: Array
         return None
     from scipy.signal import cont2discrete, lfilter
 
-    values = {name: parameter.value for name, parameter in robot.parameters.items()}
+    values = robot.values
     values |= dict(zip(calibration.names, calibration.values.tolist(), strict=True))
     still = robot.layout.from_joints(np.mean(np.hstack([q_motor, v_motor, q_motor, v_motor]), axis=0)[None, :])
     springs = problem.dynamics.model.springs(still, values)

@@ -135,8 +135,7 @@ class FreeLinks:
 
     def values(self, calibration: Calibration) -> dict[str, float]:
         """Values of all parameters, those that are held included."""
-        held = {name: p.value for name, p in self.robot.parameters.items()}
-        return held | dict(zip(calibration.names, calibration.values.tolist(), strict=True))
+        return self.robot.values | dict(zip(calibration.names, calibration.values.tolist(), strict=True))
 
     def rows(self, calibration: Calibration) -> list[EquationRows]:
         """All equations at the values of a calibration."""

@@ -44,7 +44,7 @@ class RatesOfMany:
     def __init__(self, robot: Robot, sharpness: float | None = None):
         robot.need_link_dynamics()
         self.layout = layout = robot.layout
-        values = {name: parameter.value for name, parameter in robot.parameters.items()}
+        values = robot.values
         parameters, tree = JointParameters(robot), StructuredTree(robot)
         self._bodies, self._scale = tree.bodies(values), values.get(tree.coriolis_scale or "", 1.0)
         springs, motors = JointSprings(layout, parameters), MotorTorques(robot, parameters)

@@ -71,7 +71,7 @@ def torque_reading(robot: Robot) -> Reading | None:
     sensor = robot.torque_sensor
     if sensor is None:
         return None
-    springs, values = SpringTorques(robot), {name: p.value for name, p in robot.parameters.items()}
+    springs, values = SpringTorques(robot), robot.values
     scale, offset = sensor.scale_and_offset(values)
 
     def read(x: Array) -> tuple[Array, Array]:

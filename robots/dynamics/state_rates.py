@@ -48,7 +48,7 @@ class StateRates:
 
     def __init__(self, robot: Robot, values: Mapping[str, float] | None = None):
         self.layout = layout = robot.layout
-        named = {name: parameter.value for name, parameter in robot.parameters.items()} | dict(values or {})
+        named = robot.values | dict(values or {})
         parameters, tree = JointParameters(robot), StructuredTree(robot)
         motors = MotorTorques(robot, parameters)
         bodies = tree.bodies(named)

@@ -153,7 +153,7 @@ def joint_angles(robot: Robot, q_motor: Array) -> Array:
     found = Transmission.of(robot)
     if found is None:
         return q_motor
-    return q_motor @ found.matrix({name: parameter.value for name, parameter in robot.parameters.items()}).T
+    return q_motor @ found.matrix(robot.values).T
 
 
 def motor_angles(robot: Robot, q_link: Array) -> Array:
@@ -161,4 +161,4 @@ def motor_angles(robot: Robot, q_link: Array) -> Array:
     found = Transmission.of(robot)
     if found is None:
         return q_link
-    return q_link @ found.inverse({name: parameter.value for name, parameter in robot.parameters.items()}).T
+    return q_link @ found.inverse(robot.values).T

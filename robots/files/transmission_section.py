@@ -118,7 +118,7 @@ def check_transmission(robot: Robot, place: str) -> None:
     Raises:
         RobotError: no inverse; rigid joints or free links behind it; a parameter that contradicts the matrix.
     """
-    values = {name: parameter.value for name, parameter in robot.parameters.items()}
+    values = robot.values
     own, _ = elements(robot)
     fixed = np.eye(robot.n) if robot.transmission is None else robot.transmission
     for name, at in own.items():

@@ -40,7 +40,7 @@ def calibrated_urdf(robot: Robot) -> str:
 def move_joints(root: ET.Element, robot: Robot) -> None:
     """Puts the errors of a robot that has a section `poses` into the joints of its URDF."""
     assert robot.poses is not None
-    errors = {name: parameter.value for name, parameter in robot.parameters.items()}
+    errors = robot.values
     joints = {element.get("name"): element for element in root.findall("joint")}
     model = robot.tree.model
     for j in range(1, model.njoints):

@@ -29,7 +29,7 @@ class JointParameters:
 
     def __init__(self, robot: Robot):
         self.names = tuple(name for name, parameter in robot.parameters.items() if not parameter.fixed)
-        self._values = {name: parameter.value for name, parameter in robot.parameters.items()}
+        self._values = robot.values
         drives = ("coulomb_torque", "inertia", *robot.drive_laws)
         self._sources = {law: [robot.drive_parameter(joint, law).name for joint in robot.joints] for law in drives}
         own = [f"{joint}.{SHARPNESS}" for joint in robot.joints]

@@ -36,8 +36,7 @@ class Lateness:
     def of(robot: Robot, effects: tuple[EffectAt, ...], stamps: Array) -> Lateness:
         """Samples placed where the robot's present values say."""
         nowhere = Lateness(effects, stamps, np.zeros(len(stamps)))
-        values = {name: parameter.value for name, parameter in robot.parameters.items()}
-        return replace(nowhere, anchor=nowhere.since_anchor(values)[0])
+        return replace(nowhere, anchor=nowhere.since_anchor(robot.values)[0])
 
     def since_anchor(self, values: Mapping[str, float]) -> tuple[Array, dict[str, Array]]:
         """Lateness beyond the anchor and its derivatives by parameters, by full name, shape (m,) each [s]."""

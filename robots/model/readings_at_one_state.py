@@ -44,7 +44,7 @@ class ReadingsAtOneState:
         self._gyros = {gyro.name: (tree.frame_id(gyro.body), gyro.R_imu_body) for gyro in robot.gyros}
         self._accelerometers = {sensor.name: _Seat.of(robot, sensor) for sensor in robot.accelerometers}
         self._moving = tree.model.createData()  # with accelerations
-        values = {name: parameter.value for name, parameter in robot.parameters.items()}
+        values = robot.values
         self._targets = {t.name: (tree.frame_id(t.body), *t.seen(values)[:3]) for t in robot.targets}
         encoder = robot.motor_encoder
         self._encoder = np.zeros((robot.n, robot.layout.size))

@@ -16,7 +16,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from jointscope.robots.bodies.rigid_tree import RigidTree
-from jointscope.robots.effect_kinds.effect import Effect
 from jointscope.robots.effect_kinds.effect_at import EffectAt
 from jointscope.robots.effect_kinds.joint_torque import JointTorque, Memory
 from jointscope.robots.effect_kinds.structure import Structure
@@ -161,8 +160,7 @@ class Robot:
             return self
         gone, own = {s.name for s in sensors}, {name for s in sensors for name in s.own}
         parameters = {n: replace(p, fixed=True) if n in own else p for n, p in self.parameters.items()}
-        kept = {name: sensor for name, sensor in self.sensors.items() if name not in gone}
-        return replace(self, sensors=kept, parameters=parameters)
+        return replace(self, sensors={n: s for n, s in self.sensors.items() if n not in gone}, parameters=parameters)
 
     def gravity_at(self, accelerometer: Accelerometer) -> Array:
         """Gravity as an accelerometer feels it, in the base frame, shape (3,) [m/s^2]."""
@@ -176,8 +174,7 @@ class Robot:
     @cached_property
     def layout(self) -> StateLayout:
         """Where everything is in a state vector."""
-        soft = [here.owner for here in self.effects if _is(here.effect, "bearing")]
-        elastic = [here.owner for here in self.effects if _is(here.effect, "elasticity")]
+        soft, elastic = self._owners_of("bearing"), self._owners_of("elasticity")
         links = [name for j in self.joints for name in ((*bearing_names(j), j) if j in soft else (j,))]
         motors = [j for j in self.joints if j not in self.choices.rigid_joints or j in elastic]
         equations = [f"{name}.link" for name in links] + [f"{name}.motor" for name in motors]
@@ -187,9 +184,13 @@ class Robot:
     @cached_property
     def kinematic_tree(self) -> RigidTree:
         """The rigid bodies with the hinges of soft bearings, and with Coriolis terms where an effect scales them."""
-        soft = tuple(here.owner for here in self.effects if _is(here.effect, "bearing"))
+        soft = self._owners_of("bearing")
         tree = self.tree.with_model(with_bearings(self.tree.model, soft)) if soft else self.tree
-        return tree.with_coriolis(True) if any(_is(here.effect, "coriolis") for here in self.effects) else tree
+        return tree.with_coriolis(True) if self._owners_of("coriolis") else tree
+
+    def _owners_of(self, form: str) -> tuple[str, ...]:
+        structures = ((here.owner, here.effect) for here in self.effects)
+        return tuple(owner for owner, effect in structures if isinstance(effect, Structure) and effect.form == form)
 
     def free_inertias(self) -> NDArray[np.float64]:
         """Inertia of each link coordinate while others are free, or its rotor's alone, shape (n_link,) [kg m^2]."""
@@ -201,8 +202,8 @@ class Robot:
     @property
     def memories(self) -> dict[str, Memory]:
         """States that effects bring along, by the label of the effect, the first memories of the layout."""
-        laws = [(here.label, here.effect) for here in self.effects if isinstance(here.effect, JointTorque)]
-        return {label: law.memory for label, law in laws if law.memory is not None}
+        laws = ((here.label, here.effect) for here in self.effects)
+        return {label: law.memory for label, law in laws if isinstance(law, JointTorque) and law.memory is not None}
 
     def unit_at(self, owner: str, unit: str) -> str:
         """The unit of a quantity at an owner, where `unit` is that at a joint that turns."""
@@ -220,6 +221,11 @@ class Robot:
     def command_volts(self) -> float:
         """Volts per unit of command, where the command is a duty cycle or a voltage."""
         return self.constants.get("motor.supply_voltage", 1.0) if self.command.unit == "duty" else 1.0
+
+    @property
+    def values(self) -> dict[str, float]:
+        """Present values of all parameters, by full name."""
+        return {name: parameter.value for name, parameter in self.parameters.items()}
 
     def parameter(self, name: str) -> Parameter:
         """The parameter of that name.
@@ -255,8 +261,7 @@ class Robot:
         name = f"{joint}.{SHARPNESS}"
         if values is not None and name in values:
             return values[name]
-        own = self.parameters.get(name)
-        return self.choices.friction_sharpness if own is None else own.value
+        return self.parameters[name].value if name in self.parameters else self.choices.friction_sharpness
 
     @property
     def drive_laws(self) -> tuple[str, ...]:
@@ -281,9 +286,7 @@ class Robot:
         """
         filed = self.as_filed or self.tree
         held = filed.locked | filed.posture(positions)
-        if held == self.tree.locked:
-            return self
-        return replace(self, tree=filed.locked_at(held), as_filed=filed)
+        return self if held == self.tree.locked else replace(self, tree=filed.locked_at(held), as_filed=filed)
 
     def locked_as_in(self, positions: Mapping[str, float]) -> Robot:
         """The same robot whose file locks joints it does not name yet as in a recording."""
@@ -294,7 +297,3 @@ class Robot:
     def with_sensors(self, sensors: Mapping[str, Sensor]) -> Robot:
         """The same robot with some sensors replaced."""
         return replace(self, sensors={**self.sensors, **sensors})
-
-
-def _is(effect: Effect, form: str) -> bool:
-    return isinstance(effect, Structure) and effect.form == form

@@ -141,8 +141,7 @@ def _moved(robot: Robot, target: PositionTarget, motion: JointMotion, stream: St
     if len(times) < FEWEST_POINTS:
         return []
     q = np.column_stack([np.interp(taken[inside], motion.times, column) for column in motion.q.T])
-    values = {name: parameter.value for name, parameter in robot.parameters.items()}
-    places = body_point(robot.tree, target.body, target.seen(values)[0], q).value
+    places = body_point(robot.tree, target.body, target.seen(robot.values)[0], q).value
     T = base_from_tracker(places, seen)[0]
     away, step = seen @ T[:3, :3].T + T[:3, 3] - places, np.diff(times)
     moves = np.diff(away, axis=0)
@@ -170,8 +169,7 @@ def _left_at(tree: RigidTree, target: PositionTarget, motion: JointMotion, strea
 
 def _check_target(robot: Robot, target: PositionTarget, q: Array, seen: Array) -> list[Notice]:
     tree, place = robot.tree, f"sensors.{target.name}"
-    values = {name: parameter.value for name, parameter in robot.parameters.items()}
-    at, R, origin, _ = target.seen(values)
+    at, R, origin, _ = target.seen(robot.values)
     places = body_point(tree, target.body, at, q).value
     expected = (places - origin) @ R
     size, wanted, noise = _spread(seen), _spread(expected), NOISE * target.sigma

@@ -28,17 +28,6 @@ def moving_joints(urdf: Path) -> tuple[str, ...]:
     return names
 
 
-def joints_that_matter(urdf: Path, joints: Sequence[str]) -> tuple[str, ...]:
-    """`RigidTree.other_joints` before there is a tree.
-
-    Raises:
-        RobotError: no such file, no URDF, or one of the joints cannot move.
-    """
-    bodies = UrdfBodies.read(urdf)
-    check_moving(bodies, joints)
-    return bodies.that_matter(joints)
-
-
 def check_moving(bodies: UrdfBodies, joints: Sequence[str]) -> None:
     """Complains about joints that cannot be those of a robot.
 

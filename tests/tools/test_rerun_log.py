@@ -147,7 +147,7 @@ def test_an_interrupted_log_leaves_the_old_file(result, tmp_path, monkeypatch):
         raise KeyboardInterrupt
 
     module = sys.modules[log_calibration.__module__]
-    monkeypatch.setattr(module, "send_states", interrupted)
+    monkeypatch.setattr(module, "_send_states", interrupted)
     with pytest.raises(KeyboardInterrupt):
         log_calibration(result, file)
     assert file.read_bytes() == b"old"

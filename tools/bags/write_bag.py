@@ -66,10 +66,9 @@ def joint_states(
     names: tuple[str, ...],
     stamps: NDArray[np.int64],
     fields: dict[str, NDArray[np.float64]],
-    ros2: bool = True,
 ) -> TopicMessages:
     """A topic of JointStates: `fields` are positions, velocities or efforts, shape (n, c) each."""
-    kind = known_message_type("sensor_msgs/msg/JointState", ros2)
+    kind = known_message_type("sensor_msgs/msg/JointState", True)
     return TopicMessages(topic, kind, stamps, fill_messages(kind, names, stamps, fields))
 
 

@@ -26,11 +26,10 @@ def bodies_as_calibrated(robot: Robot) -> Robot:
     Returns:
         The robot without these effects; all others are still there.
     """
-    values = {name: parameter.value for name, parameter in robot.parameters.items()}
     of_bodies = tuple(here for here in robot.effects if isinstance(here.effect, InertiaEffect))
     tree = robot.tree
     if of_bodies:
-        tree = tree.with_model(StructuredTree(replace(robot, effects=of_bodies)).bodies(values).model)
+        tree = tree.with_model(StructuredTree(replace(robot, effects=of_bodies)).bodies(robot.values).model)
     springs = [here for here in robot.effects if is_spring(here)]
     parameters = dict(robot.parameters)
     for here in springs:

@@ -119,7 +119,7 @@ def _simulated(here: EffectAt, robot: Robot) -> SimulatedEffect | None:
     form = _form(here)
     if form is None:
         return None
-    return form(here.owner, here.own({name: p.value for name, p in robot.parameters.items()}), robot)
+    return form(here.owner, here.own(robot.values), robot)
 
 
 def _never_negative(effects: Sequence[EffectAt]) -> list[str]:

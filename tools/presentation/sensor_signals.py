@@ -67,30 +67,30 @@ def signal_rows(result: CalibrationResult, bag: BagFit) -> list[SignalRow]:
     return rows
 
 
-def central_difference(times: Array, values: Array, span: float = RATE_SPAN) -> tuple[Array, Array]:
-    """Rate of change over `span` seconds around each sample; times, shape (k,), and rates, shape (k, c)."""
-    period = float(np.median(np.diff(times))) if len(times) > 1 else span
-    reach = max(round(0.5 * span / period), 1)
+def central_difference(times: Array, values: Array) -> tuple[Array, Array]:
+    """Rate of change over RATE_SPAN seconds around each sample; times, shape (k,), and rates, shape (k, c)."""
+    period = float(np.median(np.diff(times))) if len(times) > 1 else RATE_SPAN
+    reach = max(round(0.5 * RATE_SPAN / period), 1)
     if len(times) <= 2 * reach:
         return times[:0], values[:0]
     dt = times[2 * reach :] - times[: -2 * reach]
     return times[reach:-reach], (values[2 * reach :] - values[: -2 * reach]) / dt[:, None]
 
 
-def liveliest(times: Array, velocity: Array, length: float = ZOOM) -> tuple[float, float]:
-    """The stretch of `length` seconds with the strongest accelerations, all joints counted alike; limits [s]."""
+def liveliest(times: Array, velocity: Array) -> tuple[float, float]:
+    """The stretch of ZOOM seconds with the strongest accelerations, all joints counted alike; limits [s]."""
     begin, end = float(times[0]), float(times[-1])
-    if end - begin <= length:
+    if end - begin <= ZOOM:
         return begin, end
     grid = np.linspace(begin, end, max(int((end - begin) / 0.01), 2))
     v = np.column_stack([np.interp(grid, times, column) for column in velocity.T])
     a = np.abs(np.diff(v, axis=0)) / np.maximum(np.std(v, axis=0), 1e-9)
-    width = max(int(length / (grid[1] - grid[0])), 1)
+    width = max(int(ZOOM / (grid[1] - grid[0])), 1)
     # the joint that moves least in the stretch decides: a closer look should show all of them
     sums = np.cumsum(np.vstack([np.zeros(a.shape[1]), a]), axis=0)
     busy = (sums[width:] - sums[:-width]).min(axis=1)
     start = float(grid[int(np.argmax(busy))])
-    return start, start + length
+    return start, start + ZOOM
 
 
 def bag_name(bag: BagFit, index: int) -> str:

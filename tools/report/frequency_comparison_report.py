@@ -4,20 +4,16 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from html import escape
 
 import numpy as np
 
 from jointscope.graphs.frequency.compare_frequency import FrequencyErrors
 from jointscope.tools.acceptance.evaluation import NO_LIMITS, AcceptedBy
 from jointscope.tools.report.page.acceptance import acceptance
-from jointscope.tools.report.page.page import Key, Section, figure, page, table
-from jointscope.tools.report.page.plot import Axes, Band, Curve, Mark, plot
+from jointscope.tools.report.page.page import Key, Section, figure, page, text_cells
+from jointscope.tools.report.page.plot import Axes, Curve, Mark, measured_with_band, plot
 from jointscope.tools.report.sections.comparison.model_colours import model_colour
 from jointscope.tools.terminal.responses_text import BALANCE_HEAD, ERROR_HEAD, balance_rows, error_rows
-
-SIGMAS = 2.0  # half width of the bands that are drawn
-SMALLEST = 1e-3  # of an entry: the lower end of a band on a logarithmic axis
 
 
 def frequency_comparison_report(
@@ -32,10 +28,8 @@ def frequency_comparison_report(
     first = next(iter(by_label.values()))
     paths = ", ".join(each.pose.path for each in first)
     sections = [
-        Section("errors", "How far off", table(ERROR_HEAD, _escaped(error_rows(by_label)), (3, 4, 5)), ERRORS),
-        Section(
-            "balance", "What the torques show", table(BALANCE_HEAD, _escaped(balance_rows(by_label)), (3, 4)), LEFT
-        ),
+        Section("errors", "How far off", text_cells(ERROR_HEAD, error_rows(by_label), (3, 4, 5)), ERRORS),
+        Section("balance", "What the torques show", text_cells(BALANCE_HEAD, balance_rows(by_label), (3, 4)), LEFT),
         *acceptance(checked),
         *(_pose(by_label, k) for k in range(len(first))),
     ]
@@ -53,10 +47,6 @@ LEFT = (
 )
 
 
-def _escaped(rows: Sequence[Sequence[str]]) -> list[list[str]]:
-    return [[escape(cell) for cell in row] for row in rows]
-
-
 def _pose(by_label: Mapping[str, Sequence[FrequencyErrors]], k: int) -> Section:
     """Every entry of a pose, measured and of each model, and the distance in sigmas below it."""
     each = {label: poses[k] for label, poses in by_label.items()}
@@ -64,11 +54,7 @@ def _pose(by_label: Mapping[str, Sequence[FrequencyErrors]], k: int) -> Section:
     pose, square, f = first.pose, first.pose.w**2, np.asarray(first.pose.w / (2.0 * np.pi))
     for i, output in enumerate(pose.matrix.outputs):
         for j, source in enumerate(pose.matrix.inputs):
-            size, half = square * np.abs(first.measured[:, i, j]), SIGMAS * square * first.spread[:, i, j]
-            marks: list[Mark] = [
-                Band("two sigmas", f, np.maximum(size - half, SMALLEST * size), size + half, "k0"),
-                Curve("measured", f, size, "k0"),
-            ]
+            marks = measured_with_band(f, square * np.abs(first.measured[:, i, j]), square * first.spread[:, i, j])
             far: list[Mark] = []
             for number, (label, one) in enumerate(each.items()):
                 marks.append(Curve(label, f, square * np.abs(one.model[:, i, j]), model_colour(number)))

@@ -17,12 +17,10 @@ from jointscope.tools.acceptance.evaluation import NO_LIMITS, AcceptedBy
 from jointscope.tools.presentation.frequency_sentences import matrix_sentence, value_rows
 from jointscope.tools.presentation.numbers import percent
 from jointscope.tools.report.page.acceptance import acceptance
-from jointscope.tools.report.page.page import Key, Section, figure, page, table
-from jointscope.tools.report.page.plot import Axes, Band, Curve, Mark, plot
+from jointscope.tools.report.page.answer_box import checks_listed
+from jointscope.tools.report.page.page import Key, Section, figure, listed, page, text_cells
+from jointscope.tools.report.page.plot import Axes, Curve, Mark, measured_with_band, plot
 from jointscope.tools.verdicts.frequency_judgement import judge_frequency
-
-SIGMAS = 2.0  # half width of the bands that are drawn
-SMALLEST = 1e-3  # of an entry: the lower end of a band on a logarithmic axis
 
 
 def frequency_report(
@@ -48,9 +46,8 @@ def frequency_sections(result: FrequencyCalibration) -> list[Section]:
 
 def _verdict(result: FrequencyCalibration) -> Section:
     judgement = judge_frequency(result)
-    items = "".join(f"<li><b>{escape(check.name)}</b>: {escape(check.text)}</li>" for check in judgement.checks)
-    matrix = f"<li>{escape(matrix_sentence(result))}</li>"
-    return Section("verdict", "Is it good?", f"<ul>{items}{matrix}</ul>", judgement.headline)
+    items = [*checks_listed(judgement.checks), escape(matrix_sentence(result))]
+    return Section("verdict", "Is it good?", listed(items), judgement.headline)
 
 
 def response_sections(robot: Robot, start: Robot, problems: Sequence[FrequencySet]) -> list[Section]:
@@ -69,10 +66,9 @@ def response_sections(robot: Robot, start: Robot, problems: Sequence[FrequencySe
 
 
 def _values(result: FrequencyCalibration) -> Section:
-    rows = [[escape(cell) for cell in row] for row in value_rows(result)]
     head = ["parameter", "start", "value", "± sigma", "unit", ""]
     lead = "Sigmas hold the residuals, what neighbouring lines have in common, and what is in doubt of friction."
-    return Section("values", "Values", table(head, rows, (1, 2, 3)), lead)
+    return Section("values", "Values", text_cells(head, value_rows(result), (1, 2, 3)), lead)
 
 
 def _pose(robot: Robot, start: Robot, problem: FrequencySet, k: int) -> Section:
@@ -83,10 +79,8 @@ def _pose(robot: Robot, start: Robot, problem: FrequencySet, k: int) -> Section:
     model, before = (problem.response({n: p.value for n, p in one.parameters.items()}) for one in (robot, start))
     for i, joint in enumerate(m.outputs):
         for j, motor in enumerate(m.inputs):
-            size, half = square * np.abs(m.G[own, i, j]), SIGMAS * square * sigmas[:, i, j]
-            marks: list[Mark] = [
-                Band("two sigmas", f, np.maximum(size - half, SMALLEST * size), size + half, "k0"),
-                Curve("measured", f, size, "k0"),
+            marks = [
+                *measured_with_band(f, square * np.abs(m.G[own, i, j]), square * sigmas[:, i, j]),
                 Curve("start", f, square * np.abs(before[:, i, j]), "k2", "dashed"),
                 Curve("model", f, square * np.abs(model[:, i, j]), "k1"),
             ]
@@ -99,7 +93,7 @@ def _pose(robot: Robot, start: Robot, problem: FrequencySet, k: int) -> Section:
 
 def _balance(problem: FrequencySet, k: int) -> Section:
     """What torques are left at each line, beside those that excited."""
-    values = {name: p.value for name, p in problem.robot.parameters.items()}
+    values = problem.robot.values
     pose = problem.pose
     left = np.sqrt(np.mean(np.abs(problem.torque_balance(values, problem.stiffness(values))) ** 2, axis=0))
     given = np.sqrt(np.mean(np.abs(pose.torques) ** 2, axis=0))
@@ -118,7 +112,7 @@ def _answered(fits: Sequence[PoseFit]) -> Section:
     """How much of what is left answers the excitation, band by band."""
     head = ["pose", "from [Hz]", "to [Hz]", "answers the excitation", "± sigma"]
     rows = [
-        [escape(pose.path), f"{band.low:g}", f"{band.high:g}", percent(band.share), percent(band.sigma)]
+        [pose.path, f"{band.low:g}", f"{band.high:g}", percent(band.share), percent(band.sigma)]
         for pose in fits
         for band in pose.answered
     ]
@@ -126,4 +120,4 @@ def _answered(fits: Sequence[PoseFit]) -> Section:
         "Share of the power that is left that comes again under other phases of the excitation, or at neighbouring "
         "lines where there is one realisation: near nothing for noise and friction, much where a response is missing."
     )
-    return Section("answered", "Does what is left answer the excitation?", table(head, rows, (1, 2, 3, 4)), lead)
+    return Section("answered", "Does what is left answer the excitation?", text_cells(head, rows, (1, 2, 3, 4)), lead)

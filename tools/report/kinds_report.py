@@ -17,7 +17,7 @@ from jointscope.tools.presentation.frequency_sentences import (
 )
 from jointscope.tools.report.frequency_report import response_sections
 from jointscope.tools.report.page.acceptance import acceptance
-from jointscope.tools.report.page.page import Section, page
+from jointscope.tools.report.page.page import Section, listed, page
 from jointscope.tools.report.poses_report import pose_sections
 from jointscope.tools.verdicts.frequency_judgement import judge_kinds
 
@@ -34,10 +34,10 @@ def kinds_report(result: KindsCalibration, checked: AcceptedBy = NO_LIMITS, more
     paths = [p.poses.path for p in result.poses.problems] + [p.pose.path for p in responses.problems]
     said = [matrix_sentence(responses), identifiable_sentence(responses)]
     said += [*one_realisation(responses), *sticking(responses)]
-    items = "".join(f"<li>{escape(item)}</li>" for item in [*kinds_sentences(result), *said])
+    items = [escape(item) for item in (*kinds_sentences(result), *said)]
     verdict, *others = pose_sections(result.poses)
     sections = [
-        Section("kinds", "Do the kinds agree?", f"<ul>{items}</ul>", judge_kinds(result).headline),
+        Section("kinds", "Do the kinds agree?", listed(items), judge_kinds(result).headline),
         verdict,
         *acceptance(checked),
         *others,

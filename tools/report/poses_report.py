@@ -19,7 +19,8 @@ from jointscope.tools.acceptance.evaluation import NO_LIMITS, AcceptedBy
 from jointscope.tools.presentation.numbers import with_sigma
 from jointscope.tools.presentation.tip_numbers import target_rows, tip_cells, tip_head
 from jointscope.tools.report.page.acceptance import acceptance
-from jointscope.tools.report.page.page import Key, Section, figure, page, table
+from jointscope.tools.report.page.answer_box import checks_listed
+from jointscope.tools.report.page.page import Key, Section, figure, listed, page, table, text_cells
 from jointscope.tools.report.page.plot import Axes, Bars, Curve, plot
 from jointscope.tools.terminal.searches.arm_discovery_text import step_table
 from jointscope.tools.verdicts.pose_judgement import judge_poses
@@ -56,19 +57,18 @@ def pose_sections(result: PoseCalibration) -> list[Section]:
 def steps_section(found: ArmDiscovery) -> Section:
     """The waterfall: what each effect that was added is worth."""
     head, rows = step_table(found)
-    rows = [[escape(cell) for cell in row] for row in rows]
     lead = f"The search ended because {found.stop_reason}."
-    return Section("steps", "What was missing", table(head, rows, range(2, len(head))), lead)
+    return Section("steps", "What was missing", text_cells(head, rows, range(2, len(head))), lead)
 
 
 def _verdict(result: PoseCalibration) -> Section:
     judgement = judge_poses(result)
-    items = "".join(f"<li><b>{escape(check.name)}</b>: {escape(check.text)}</li>" for check in judgement.checks)
-    out = "".join(
-        f"<li>pose {escape(each.name)} of {escape(each.path)} was left out: {each.sigmas:.0f} sigma away</li>"
+    items = checks_listed(judgement.checks)
+    items += [
+        f"pose {escape(each.name)} of {escape(each.path)} was left out: {each.sigmas:.0f} sigma away"
         for each in result.left_out
-    )
-    return Section("verdict", "Is it good?", f"<ul>{items}{out}</ul>", judgement.headline)
+    ]
+    return Section("verdict", "Is it good?", listed(items), judgement.headline)
 
 
 def _waterfall(result: PoseCalibration) -> Section:
@@ -144,6 +144,6 @@ def _values(result: PoseCalibration) -> Section:
 
 
 def _silent(result: PoseCalibration) -> Section:
-    items = "".join(f"<li>{escape(combination_text(weights))}</li>" for weights in result.determined.combinations)
+    items = [escape(combination_text(weights)) for weights in result.determined.combinations]
     lead = f"{result.determined.rank} combinations of geometric errors are determined; these move no target:"
-    return Section("silent", "What these poses cannot determine", f"<ul>{items}</ul>", lead)
+    return Section("silent", "What these poses cannot determine", listed(items), lead)

@@ -4,19 +4,15 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from html import escape
 
 import numpy as np
 
 from jointscope.graphs.responses.distortions import Distortions, Levels
 from jointscope.graphs.responses.measured_response import MeasuredResponse
 from jointscope.tools.presentation.noisy_response import buried_lines
-from jointscope.tools.report.page.page import Key, Section, figure, page, table
-from jointscope.tools.report.page.plot import Axes, Band, Curve, Mark, plot
+from jointscope.tools.report.page.page import Key, Section, figure, page, text_cells
+from jointscope.tools.report.page.plot import Axes, Curve, Mark, measured_with_band, plot
 from jointscope.tools.terminal.responses_text import RESONANCE_HEAD, entry_rows, resonance_rows
-
-SIGMAS = 2.0  # half width of the bands that are drawn
-SMALLEST = 1e-3  # of an entry: the lower end of a band on a logarithmic axis
 
 
 def responses_report(found: Sequence[MeasuredResponse]) -> str:
@@ -31,12 +27,11 @@ def _sections(found: MeasuredResponse, suffix: str) -> list[Section]:
         "Sigma in per cent of each entry, the median over lines. Noise: what changes from period to period. Total: "
         f"with the distortions, from {matrix.total_from}. {buried_lines(found)}"
     )
-    entries = [[escape(cell) for cell in row] for row in entry_rows(matrix)]
     made = [
         Section(
             f"entries{suffix}",
             f"How well it is known{name}",
-            table(["from", "to", "noise", "total"], entries, (2, 3)),
+            text_cells(["from", "to", "noise", "total"], entry_rows(matrix), (2, 3)),
             lead,
         ),
         bode_grid(found, f"bode{suffix}", f"Response{name}"),
@@ -44,8 +39,8 @@ def _sections(found: MeasuredResponse, suffix: str) -> list[Section]:
     if found.distortions is not None:
         made.append(_distortions(found, found.distortions, f"distortions{suffix}", f"Distortions{name}"))
     if found.resonances:
-        rows = [[escape(cell) for cell in row] for row in resonance_rows(found)]
-        made.append(Section(f"peaks{suffix}", f"Resonances{name}", table(RESONANCE_HEAD, rows, range(3, 7)), PEAKS))
+        peaks = text_cells(RESONANCE_HEAD, resonance_rows(found), range(3, 7))
+        made.append(Section(f"peaks{suffix}", f"Resonances{name}", peaks, PEAKS))
     return made
 
 
@@ -59,12 +54,8 @@ def bode_grid(found: MeasuredResponse, id: str, title: str) -> Section:
     for i, output in enumerate(m.outputs):
         for j, source in enumerate(m.inputs):
             size = np.abs(m.G[:, i, j])
-            half = SIGMAS * total[:, i, j]
-            marks: list[Mark] = [
-                Band("two sigmas, total", m.frequencies, np.maximum(size - half, SMALLEST * size), size + half, "k0"),
-                Curve("measured", m.frequencies, size, "k0"),
-                Curve("sigma, total", m.frequencies, total[:, i, j], "k1", "hair"),
-            ]
+            marks = measured_with_band(m.frequencies, size, total[:, i, j], "two sigmas, total")
+            marks.append(Curve("sigma, total", m.frequencies, total[:, i, j], "k1", "hair"))
             if noise is not None:
                 marks.append(Curve("sigma, noise", m.frequencies, noise[:, i, j], "k2", "hair"))
             panels.append(

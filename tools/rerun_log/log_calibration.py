@@ -15,6 +15,7 @@ from jointscope.tools.rerun_log.entities.columns import GREY, JOINT_COLOURS, WHI
 from jointscope.tools.rerun_log.entities.covariance_picture import covariance_views, send_covariance
 from jointscope.tools.rerun_log.entities.moving_robot import robot_view, send_robot
 from jointscope.tools.rerun_log.entities.rrd_file import rrd_file
+from jointscope.tools.rerun_log.entities.tab_contents import document_view, plot_columns, plot_view, send_document
 from jointscope.tools.rerun_log.entities.tabbed_blueprint import tabbed_blueprint
 from jointscope.tools.rerun_log.entities.viewer_text import entity, viewer_text
 from jointscope.tools.verdicts.judgement import judge
@@ -41,7 +42,7 @@ def log_calibration(result: CalibrationResult, path: str | Path) -> None:
         bag.states.size * 2 + 12 * s.measured.size for bag in result.bags for s in bag.residuals.values()
     )
     with rrd_file(path, _blueprint(result), expected) as stream:
-        _send_findings(stream, result)
+        send_document(stream, "findings", findings_text(result))
         send_covariance(stream, result)
         for i, bag in enumerate(result.bags):
             root = _root(result, i)
@@ -58,8 +59,7 @@ def _root(result: CalibrationResult, bag: int) -> str:
 def _blueprint(result: CalibrationResult) -> rrb.Blueprint:
     import rerun.blueprint as rrb
 
-    findings = rrb.TextDocumentView(origin="/findings", name="findings")
-    tabs: list[rrb.View | rrb.Container] = [findings]
+    tabs: list[rrb.View | rrb.Container] = [document_view("findings")]
     for i, bag in enumerate(result.bags):
         root = _root(result, i)
         own: list[rrb.View | rrb.Container] = [
@@ -71,13 +71,6 @@ def _blueprint(result: CalibrationResult) -> rrb.Blueprint:
         tabs += own if not root else [rrb.Tabs(*own, name=viewer_text(bag_name(bag, i)))]
     tabs.insert(3 if len(result.bags) == 1 else 1, covariance_views())
     return tabbed_blueprint(tabs)
-
-
-def _send_findings(stream: rr.RecordingStream, result: CalibrationResult) -> None:
-    import rerun as rr
-
-    document = rr.TextDocument(viewer_text(findings_text(result)), media_type=rr.MediaType.MARKDOWN)
-    stream.log("findings", document, static=True)
 
 
 def findings_text(result: CalibrationResult) -> str:
@@ -112,23 +105,15 @@ def _send_sensors(stream: rr.RecordingStream, fit: BagFit, root: str) -> None:
 
 def _sensor_views(fit: BagFit, root: str, kind: str) -> rrb.Horizontal:
     """One column per sensor, one plot per channel; `kind` is "residuals" or "signals"."""
-    import rerun.blueprint as rrb
-
     columns = [
-        rrb.Vertical(
-            *(
-                rrb.TimeSeriesView(
-                    origin="/" + entity(root, kind, name, channel),
-                    name=viewer_text(f"{channel} [{unit}]"),
-                    plot_legend=rrb.PlotLegend(visible=kind == "signals"),
-                )
-                for channel, unit in zip(series.channels, series.units, strict=True)
-            ),
-            name=viewer_text(name),
-        )
+        [
+            plot_view(f"{channel} [{unit}]", root, kind, name, channel, legend=kind == "signals")
+            for channel, unit in zip(series.channels, series.units, strict=True)
+        ]
         for name, series in fit.residuals.items()
     ]
-    return rrb.Horizontal(*columns, name=kind if kind == "residuals" else "measured and predicted")
+    title = kind if kind == "residuals" else "measured and predicted"
+    return plot_columns(columns, title, list(fit.residuals))
 
 
 def _send_states(stream: rr.RecordingStream, robot: Robot, fit: BagFit, root: str) -> None:
@@ -157,20 +142,11 @@ def _send_states(stream: rr.RecordingStream, robot: Robot, fit: BagFit, root: st
 
 def _state_views(robot: Robot, root: str) -> rrb.Horizontal:
     """One column per joint, one row per quantity."""
-    import rerun.blueprint as rrb
-
-    return rrb.Horizontal(
-        *(
-            rrb.Vertical(
-                *(
-                    rrb.TimeSeriesView(
-                        origin="/" + entity(root, "states", joint, name),
-                        name=viewer_text(f"{joint} {name} [{robot.unit_at(joint, unit)}]"),
-                    )
-                    for name, unit in PLOTS
-                )
-            )
-            for joint in robot.joints
-        ),
-        name="states",
-    )
+    columns = [
+        [
+            plot_view(f"{joint} {name} [{robot.unit_at(joint, unit)}]", root, "states", joint, name)
+            for name, unit in PLOTS
+        ]
+        for joint in robot.joints
+    ]
+    return plot_columns(columns, "states")

@@ -13,6 +13,7 @@ from jointscope.tools.report.sections.closed_loop.loop_answer import loop_judgem
 from jointscope.tools.rerun_log.entities.columns import GREY, WHITE, Colour, send_lines, thinned, time_column
 from jointscope.tools.rerun_log.entities.moving_robot import robot_view, send_bodies
 from jointscope.tools.rerun_log.entities.rrd_file import rrd_file
+from jointscope.tools.rerun_log.entities.tab_contents import document_view, plot_columns, plot_view, send_document
 from jointscope.tools.rerun_log.entities.tabbed_blueprint import tabbed_blueprint
 from jointscope.tools.rerun_log.entities.viewer_text import entity, viewer_text
 from jointscope.tools.terminal.closed_loop_text import closed_loop_text
@@ -38,16 +39,14 @@ def log_closed_loop(result: ClosedLoopResult, path: str | Path) -> None:
     """
     expected = 8 * sum(3 * run.states.size for run in result.runs)
     with rrd_file(path, _blueprint(result), expected) as stream:
-        _send_findings(stream, result)
+        send_document(stream, "findings", _findings(result))
         for run in result.runs:
             _send_run(stream, result, run)
         _send_robot(stream, result)
 
 
 def _blueprint(result: ClosedLoopResult) -> rrb.Blueprint:
-    import rerun.blueprint as rrb
-
-    tabs: list[rrb.View | rrb.Container] = [rrb.TextDocumentView(origin="/findings", name="findings")]
+    tabs: list[rrb.View | rrb.Container] = [document_view("findings")]
     for controller, name in CONTROLLERS.items():
         if any(run.controller == controller for run in result.runs):
             tabs.append(_controller_views(result, controller, name))
@@ -57,33 +56,22 @@ def _blueprint(result: ClosedLoopResult) -> rrb.Blueprint:
 def _controller_views(result: ClosedLoopResult, controller: str, name: str) -> rrb.Vertical:
     import rerun.blueprint as rrb
 
-    def column(joint: str) -> rrb.Vertical:
-        plots = (
-            ("link_error", "link error [rad]"),
-            ("v_error", "link velocity known − true [rad/s]"),
-            ("command", "command, share"),
-        )
-        return rrb.Vertical(
-            *(
-                rrb.TimeSeriesView(
-                    origin="/" + entity("loops", controller, joint, what), name=viewer_text(f"{joint} {title}")
-                )
-                for what, title in plots
-            )
-        )
-
-    head = rrb.TimeSeriesView(origin="/" + entity("loops", controller, "head"), name="head, distance from the plan [m]")
-    columns = rrb.Horizontal(*(column(joint) for joint in result.robot.joints))
+    plots = (
+        ("link_error", "link error [rad]"),
+        ("v_error", "link velocity known − true [rad/s]"),
+        ("command", "command, share"),
+    )
+    head = plot_view("head, distance from the plan [m]", "loops", controller, "head")
+    columns = plot_columns(
+        [plot_view(f"{joint} {title}", "loops", controller, joint, what) for what, title in plots]
+        for joint in result.robot.joints
+    )
     return rrb.Vertical(head, columns, row_shares=[1, 3], name=viewer_text(name))
 
 
-def _send_findings(stream: rr.RecordingStream, result: ClosedLoopResult) -> None:
-    import rerun as rr
-
+def _findings(result: ClosedLoopResult) -> str:
     answer = loop_judgement(result)
-    text = f"# {answer.headline}\n\n{answer.why}\n\n```\n{closed_loop_text(result)}\n```"
-    document = rr.TextDocument(viewer_text(text), media_type=rr.MediaType.MARKDOWN)
-    stream.log("findings", document, static=True)
+    return f"# {answer.headline}\n\n{answer.why}\n\n```\n{closed_loop_text(result)}\n```"
 
 
 def _send_run(stream: rr.RecordingStream, result: ClosedLoopResult, run: LoopRun) -> None:

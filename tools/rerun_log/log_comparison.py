@@ -4,18 +4,13 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from jointscope.graphs.comparison.comparison_result import ComparisonResult
 from jointscope.tools.presentation.numbers import percent, significant
 from jointscope.tools.rerun_log.entities.prediction_lines import prediction_bytes, prediction_views, send_predictions
 from jointscope.tools.rerun_log.entities.rrd_file import rrd_file
+from jointscope.tools.rerun_log.entities.tab_contents import document_view, send_document
 from jointscope.tools.rerun_log.entities.tabbed_blueprint import tabbed_blueprint
-from jointscope.tools.rerun_log.entities.viewer_text import viewer_text
-
-if TYPE_CHECKING:
-    import rerun as rr
-    import rerun.blueprint as rrb
 
 
 def log_comparison(result: ComparisonResult, path: str | Path) -> None:
@@ -28,23 +23,10 @@ def log_comparison(result: ComparisonResult, path: str | Path) -> None:
     Raises:
         JointscopeError: the file cannot be written; nothing is left behind.
     """
-    with rrd_file(path, _blueprint(result), prediction_bytes(result)) as stream:
-        _send_scores(stream, result)
+    blueprint = tabbed_blueprint([document_view("scores"), *prediction_views(result)])
+    with rrd_file(path, blueprint, prediction_bytes(result)) as stream:
+        send_document(stream, "scores", scores_text(result))
         send_predictions(stream, result)
-
-
-def _blueprint(result: ComparisonResult) -> rrb.Blueprint:
-    import rerun.blueprint as rrb
-
-    scores = rrb.TextDocumentView(origin="/scores", name="scores")
-    return tabbed_blueprint([scores, *prediction_views(result)])
-
-
-def _send_scores(stream: rr.RecordingStream, result: ComparisonResult) -> None:
-    import rerun as rr
-
-    document = rr.TextDocument(viewer_text(scores_text(result)), media_type=rr.MediaType.MARKDOWN)
-    stream.log("scores", document, static=True)
 
 
 def scores_text(result: ComparisonResult) -> str:

@@ -8,9 +8,10 @@ from typing import TYPE_CHECKING
 
 from jointscope.graphs.discovery.diagnosis_result import Diagnosis
 from jointscope.tools.presentation.compared_models import of_diagnosis
-from jointscope.tools.rerun_log.entities.diagnosis_documents import diagnosis_markdown, ranking_markdown, send_document
+from jointscope.tools.rerun_log.entities.diagnosis_documents import diagnosis_markdown, ranking_markdown
 from jointscope.tools.rerun_log.entities.prediction_lines import prediction_bytes, prediction_views, send_predictions
 from jointscope.tools.rerun_log.entities.rrd_file import rrd_file
+from jointscope.tools.rerun_log.entities.tab_contents import document_view, send_document
 from jointscope.tools.rerun_log.entities.tabbed_blueprint import tabbed_blueprint
 from jointscope.tools.rerun_log.entities.torque_lines import send_torque, torque_bytes, torque_views
 
@@ -40,12 +41,7 @@ def log_diagnosis(result: Diagnosis, path: str | Path) -> None:
 
 
 def _blueprint(result: Diagnosis) -> rrb.Blueprint:
-    import rerun.blueprint as rrb
-
-    tabs: list[rrb.View | rrb.Container] = [
-        rrb.TextDocumentView(origin="/findings", name="findings"),
-        rrb.TextDocumentView(origin="/ranking", name="ranking"),
-    ]
+    tabs: list[rrb.View | rrb.Container] = [document_view("findings"), document_view("ranking")]
     if result.missing is not None:
         tabs += torque_views(result.missing, "", "")
     compared = of_diagnosis(result)

@@ -15,10 +15,10 @@ from jointscope.tools.rerun_log.entities.diagnosis_documents import (
     diagnosis_markdown,
     discovery_markdown,
     ranking_markdown,
-    send_document,
 )
 from jointscope.tools.rerun_log.entities.prediction_lines import prediction_bytes, prediction_views, send_predictions
 from jointscope.tools.rerun_log.entities.rrd_file import rrd_file
+from jointscope.tools.rerun_log.entities.tab_contents import document_view, send_document
 from jointscope.tools.rerun_log.entities.tabbed_blueprint import tabbed_blueprint
 from jointscope.tools.rerun_log.entities.torque_lines import send_torque, torque_bytes, torque_views
 from jointscope.tools.rerun_log.entities.viewer_text import viewer_text
@@ -81,8 +81,8 @@ def _blueprint(result: Discovery) -> rrb.Blueprint:
     tabs: list[rrb.View | rrb.Container] = [waterfall]
     for k, diagnosis in _diagnoses(result).items():
         own: list[rrb.View | rrb.Container] = [
-            rrb.TextDocumentView(origin=f"/step{k}/ranking", name="ranking"),
-            rrb.TextDocumentView(origin=f"/step{k}/findings", name="findings"),
+            document_view(f"step{k}/ranking"),
+            document_view(f"step{k}/findings"),
         ]
         if diagnosis.missing is not None:
             own += torque_views(diagnosis.missing, f"step{k}", "")

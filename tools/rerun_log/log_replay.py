@@ -23,8 +23,8 @@ from jointscope.tools.rerun_log.entities.event_lines import event_view, latency_
 from jointscope.tools.rerun_log.entities.innovation_lines import innovation_views, nis_views, send_innovations, send_nis
 from jointscope.tools.rerun_log.entities.moving_robot import robot_view, send_estimate
 from jointscope.tools.rerun_log.entities.rrd_file import rrd_file
+from jointscope.tools.rerun_log.entities.tab_contents import document_view, send_document
 from jointscope.tools.rerun_log.entities.tabbed_blueprint import tabbed_blueprint
-from jointscope.tools.rerun_log.entities.viewer_text import viewer_text
 from jointscope.tools.rerun_log.log_calibration import SIGNS
 from jointscope.tools.verdicts.replay_judgement import diagnose_command, judge_replay, suspects
 
@@ -45,8 +45,7 @@ def log_replay(result: ReplayResult, path: str | Path) -> None:
     """
     expected = 8 * (5 * result.states.mean.size + 5 * sum(s.residual.size for s in result.innovations.values()))
     with rrd_file(path, replay_blueprint(result.robot, tuple(result.adapted), result), expected) as stream:
-        document = viewer_text(replay_markdown(result))
-        send_document(stream, document)
+        send_document(stream, "findings", replay_markdown(result))
         send_innovations(stream, result.innovations)
         send_nis(stream, result.innovations)
         send_estimate_lines(stream, result.robot, result.states, result.lagged)
@@ -75,7 +74,7 @@ def replay_blueprint(robot: Robot, adapted: tuple[str, ...] = (), result: Replay
         name="covariance",
     )
     tabs: list[rrb.View | rrb.Container] = [
-        *([] if result is None else [rrb.TextDocumentView(origin="/findings", name="findings")]),
+        *([] if result is None else [document_view("findings")]),
         overview,
         innovation_views(robot, None if result is None else result.innovations),
         nis_views(robot),
@@ -103,13 +102,6 @@ def send_pose(
         return magnified
     q = link_coordinates(robot, states, times)
     return send_estimate(stream, robot, times, q, covariances.matrices[:, link, link], magnified)
-
-
-def send_document(stream: rr.RecordingStream, text: str) -> None:
-    """Entity findings."""
-    import rerun as rr
-
-    stream.log("findings", rr.TextDocument(text, media_type=rr.MediaType.MARKDOWN), static=True)
 
 
 def replay_markdown(result: ReplayResult) -> str:

@@ -131,7 +131,7 @@ def _summary(simulation: Simulation, robot: Robot, bag: Path, truth_file: Path) 
 
 def _option(here: EffectAt, robot: Robot) -> str:
     """What the command line would say to simulate an effect of the robot file at its value there."""
-    values = here.own({name: parameter.value for name, parameter in robot.parameters.items()})
+    values = here.own(robot.values)
     sizes = ",".join(f"{name}={value:.6g}" for name, value in values.items())
     return f"--effect {here.label}{':' if sizes else ''}{sizes}"
 

@@ -69,20 +69,19 @@ def channel_memory(fit: BagFit, robot: Robot) -> dict[str, float]:
     return found
 
 
-def strength(times: Array, residual: Array, window: float = WINDOW) -> tuple[Array, Array]:
+def strength(times: Array, residual: Array) -> tuple[Array, Array]:
     """Root mean square of residuals in windows of time.
 
     Args:
         times: shape (m,) [s].
         residual: in sigmas, shape (m, c).
-        window: length of a window [s].
 
     Returns:
         Edges of the windows, shape (w + 1,) [s]; strength, shape (w, c), NaN where a window is empty.
     """
-    count = max(int(np.ceil((times[-1] - times[0]) / window)), 1)
-    edges = times[0] + window * np.arange(count + 1)
-    which = np.clip(((times - times[0]) / window).astype(int), 0, count - 1)
+    count = max(int(np.ceil((times[-1] - times[0]) / WINDOW)), 1)
+    edges = times[0] + WINDOW * np.arange(count + 1)
+    which = np.clip(((times - times[0]) / WINDOW).astype(int), 0, count - 1)
     squares = np.nan_to_num(residual) ** 2
     sums = np.stack([np.bincount(which, column, count) for column in squares.T], axis=1)
     number = np.stack([np.bincount(which, column, count) for column in np.isfinite(residual).T.astype(float)], axis=1)

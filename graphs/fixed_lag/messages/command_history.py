@@ -47,7 +47,7 @@ class CommandHistory:
         probe = CommandPath(np.array([0.0, 1.0]), np.zeros((1, robot.n)), robot.effects, robot.joints)
         self._changes = probe.changes
         self._kept = lag + KEPT
-        self._values: Mapping[str, float] = {name: p.value for name, p in robot.parameters.items()}
+        self._values: Mapping[str, float] = robot.values
         self._times: list[float] = []
         self._u: list[Array] = []
         self._about: list[NDArray[np.bool_] | None] = []
@@ -59,11 +59,6 @@ class CommandHistory:
 
     def __len__(self) -> int:
         return len(self._times)
-
-    @property
-    def last_time(self) -> float:
-        """Stamp of the newest command [s]; minus infinity without one."""
-        return self._times[-1] if self._times else float("-inf")
 
     def add(self, t: float, u: Array, about: NDArray[np.bool_] | None = None) -> None:
         """Takes in a command of all joints; it may be older than others, and new only for those that it is `about`."""

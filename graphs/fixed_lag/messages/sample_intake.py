@@ -39,7 +39,7 @@ class SampleIntake:
 
     def __init__(self, robot: Robot, status: EstimatorStatus, log: EventLog, clock: ClockWatch):
         self._robot, self._status, self._log, self._clock = robot, status, log, clock
-        self._values = {name: parameter.value for name, parameter in robot.parameters.items()}
+        self._values = robot.values
         self._acting = np.full(robot.n, np.nan)  # last command of each joint
         self._in_doubt = 0  # commands since then
         self._checks = {"command": SampleChecks([0.0] * robot.n, False)}

@@ -25,25 +25,17 @@ MOST = 1 << 17  # rows: 131 s at 1 kHz are kept whole
 class TickLog:
     """Ticks as series."""
 
-    def __init__(self, robot: Robot, most: int = MOST, matrices: int = MATRICES):
-        """Empty.
-
-        Args:
-            robot: the model.
-            most: rows of a series that are kept.
-            matrices: covariance matrices that are kept.
-        """
+    def __init__(self, robot: Robot):
         self.ticks = 0
         self._robot = robot
-        self._most = most
-        self._now = StateLog(robot, most)
-        self._lagged = StateLog(robot, most)
+        self._now = StateLog(robot)
+        self._lagged = StateLog(robot)
         self._innovations: dict[str, InnovationLog] = {}
         d = robot.layout.size
-        self._matrices = ThinnedRows(1 + d * d, matrices)
+        self._matrices = ThinnedRows(1 + d * d, MATRICES)
         self._next_matrix = -np.inf
         self._seconds = array("f")
-        self._latency = ThinnedRows(2, most)
+        self._latency = ThinnedRows(2)
 
     @property
     def stride(self) -> int:
@@ -61,7 +53,7 @@ class TickLog:
             log = self._innovations.get(innovation.sensor)
             if log is None:
                 channels = self._robot.sensors[innovation.sensor].channels
-                log = self._innovations[innovation.sensor] = InnovationLog(channels, self._most)
+                log = self._innovations[innovation.sensor] = InnovationLog(channels)
             log.add(innovation)
         self._seconds.append(seconds)
         if (row := self._latency.next()) is not None:
@@ -102,9 +94,8 @@ class TickLog:
 class StateLog:
     """Estimated states as rows: time, mean, sigma, sigma of the deflections, biases and parameters with sigmas."""
 
-    def __init__(self, robot: Robot, most: int):
+    def __init__(self, robot: Robot):
         self._layout = robot.layout
-        self._most = most
         self._rows: ThinnedRows | None = None
         self._gyros: tuple[str, ...] = ()
         self._parameters: tuple[str, ...] = ()
@@ -120,7 +111,7 @@ class StateLog:
             self._gyros, self._parameters = tuple(state.biases), tuple(state.parameters)
             layout = self._layout
             width = 1 + 2 * layout.size + len(layout.joints) + 6 * len(self._gyros) + 2 * len(self._parameters)
-            self._rows = ThinnedRows(width, self._most)
+            self._rows = ThinnedRows(width)
         row = self._rows.next()
         if row is None:
             return
@@ -160,9 +151,9 @@ class StateLog:
 class InnovationLog:
     """Innovations of one sensor as rows: time, nis, dof, used, residual, sigma; and sums over all of them."""
 
-    def __init__(self, channels: tuple[str, ...], most: int):
+    def __init__(self, channels: tuple[str, ...]):
         self._channels = channels
-        self._rows = ThinnedRows(4 + 2 * len(channels), most)
+        self._rows = ThinnedRows(4 + 2 * len(channels))
         self._squares, self._used = np.zeros(len(channels)), np.zeros(len(channels))
         self._nis = self._dof = 0.0
         self._count = 0
@@ -221,8 +212,8 @@ class ThinnedRows:
             width: numbers in a row.
             most: rows kept, even.
         """
-        self.stride = 1
         self._most = most
+        self.stride = 1
         self._offered = 0
         self._kept = 0
         self._rows = np.empty((min(FIRST, most), width))

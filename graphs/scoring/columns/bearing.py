@@ -92,7 +92,7 @@ def _slopes(tree: RigidTree, s: ScoreSignals, q: Array, v: Array, a: Array) -> d
         gyro, lever, gravity = gyros[sensor.gyro], sensor.place(s.robot.parameters), s.robot.gravity_at(sensor)
         f = specific_force(tree, gyro.body, lever, q, v, a, gravity)
         found[sensor.name] = gyro.R_imu_body @ f.by_q, gyro.R_imu_body @ f.by_v, gyro.R_imu_body @ f.by_a
-    values = {name: parameter.value for name, parameter in s.robot.parameters.items()}
+    values = s.robot.values
     for target in s.robot.targets:
         at, R, _, _ = target.seen(values)
         by_q = R.T @ body_point(tree, target.body, at, q).by_q

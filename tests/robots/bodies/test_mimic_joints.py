@@ -9,7 +9,8 @@ from robots_to_compare import MIMICKING
 
 from jointscope.robots.bodies.rigid_tree import RigidTree
 from jointscope.robots.errors import RobotError
-from jointscope.robots.urdf.usable_joints import joints_that_matter, moving_joints
+from jointscope.robots.urdf.urdf_bodies import UrdfBodies
+from jointscope.robots.urdf.usable_joints import moving_joints
 
 JOINTS, ORDER = ("joint1", "joint2", "joint3"), ("joint3", "joint1", "joint2")
 GRAVITY = np.array([1.0, -2.0, -9.0])
@@ -148,11 +149,12 @@ def test_mimic_joints_are_no_joints_of_a_robot_and_continuous_ones_are():
 
 
 def test_only_joints_that_carry_or_are_carried_matter():
-    assert joints_that_matter(MIMICKING, JOINTS) == ("ear",)
-    assert joints_that_matter(MIMICKING, ("ear",)) == JOINTS
-    assert joints_that_matter(MIMICKING, ("wave",)) == ()
+    bodies = UrdfBodies.read(MIMICKING)
+    assert bodies.that_matter(JOINTS) == ("ear",)
+    assert bodies.that_matter(("ear",)) == JOINTS
+    assert bodies.that_matter(("wave",)) == ()
     # joint3 moves the tail, which stands on link1
-    assert joints_that_matter(MIMICKING, ("joint1",)) == ("joint2", "joint3", "ear")
+    assert bodies.that_matter(("joint1",)) == ("joint2", "joint3", "ear")
     assert RigidTree(MIMICKING, JOINTS, GRAVITY).other_joints == ("ear",)
 
 

@@ -70,7 +70,7 @@ def test_errors_of_the_geometry_are_those_of_a_urdf_that_has_them(tmp_path):
     robot = misplaced(READY)
     root = read_urdf(robot.tree.urdf)
     nowhere = SimpleNamespace(link=None, tracker_link=None, targets=(), others=())  # no target
-    move_joints(root, SimpleNamespace(poses=nowhere, parameters=robot.parameters, tree=robot.tree))
+    move_joints(root, SimpleNamespace(poses=nowhere, values=robot.values, tree=robot.tree))
     (tmp_path / "moved.urdf").write_text(urdf_text(root), encoding="utf-8")
     gravity = np.array([0.0, 0.0, -9.81])
     moved = RigidTree(tmp_path / "moved.urdf", robot.joints, gravity)

@@ -15,7 +15,7 @@ from jointscope.robots.model.robot import Robot
 from jointscope.robots.rests.load_history import LoadHistory
 from jointscope.robots.rests.rests import Rests, find_rests
 from jointscope.robots.yaml_section import did_you_mean
-from jointscope.tools.bags.messages.open_bag import Progress, open_bag
+from jointscope.tools.bags.messages.open_bag import open_bag
 from jointscope.tools.bags.read_recording import read_recording
 
 LOAD = "/load"
@@ -23,19 +23,18 @@ LOAD_TYPE = "geometry_msgs/msg/WrenchStamped"
 HEAVY = 3.0  # times what the robot weighs: no arm holds that
 
 
-def read_rests(path: str | Path, robot: Robot, progress: Progress | None = None) -> Rests:
+def read_rests(path: str | Path, robot: Robot) -> Rests:
     """Reads the rests of a bag.
 
     Args:
         path: a ROS 1 .bag, a ROS 2 folder, a .db3 or an .mcap.
         robot: says which topics, fields, units and joint names.
-        progress: called with the number of messages read and expected.
 
     Raises:
         RecordingError: the bag cannot be read, has no rests, or loads that cannot hang on this robot.
     """
     robot.need_link_dynamics()
-    recording = read_recording(path, robot, progress)
+    recording = read_recording(path, robot)
     return find_rests(recording, robot, _loads(Path(path), robot, recording.start_ns, recording.shortened))
 
 

@@ -101,12 +101,12 @@ def _with(guess: UnitGuess, slides: NDArray[np.bool_], unit: str) -> UnitGuess:
     return UnitGuess(tuple(u if slide else unit for u, slide in zip(guess.units, slides, strict=True)), guess.reason)
 
 
-def seen_rates(encoder: Stream, gyros: Sequence[Stream], most: int = INSTANTS) -> list[SeenRate]:
+def seen_rates(encoder: Stream, gyros: Sequence[Stream]) -> list[SeenRate]:
     """What those gyroscopes saw that turn, beside the motion of an encoder [rad]."""
     if not gyros:
         return []
     motion = joint_motion(encoder, np.zeros(encoder.values.shape[1]))
-    most = min(most, max(most * FEW_JOINTS // encoder.values.shape[1], LEAST))
+    most = min(INSTANTS, max(INSTANTS * FEW_JOINTS // encoder.values.shape[1], LEAST))
     found = [seen_rate(motion, gyro, most) for gyro in gyros]
     return [seen for seen in found if seen is not None]
 

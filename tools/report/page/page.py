@@ -106,9 +106,20 @@ def table(head: Sequence[str], rows: Iterable[Sequence[str]], numbers: Sequence[
     return f'<div class="scroll"><table><thead><tr>{top}</tr></thead><tbody>{body}</tbody></table></div>'
 
 
+def text_cells(head: Sequence[str], rows: Iterable[Sequence[str]], numbers: Sequence[int] = ()) -> str:
+    """A table of cells that are plain text."""
+    return table(head, [[escape(cell) for cell in row] for row in rows], numbers)
+
+
 def foldable(title: str, body: str) -> str:
     """Details that are closed at first."""
     return f"<details><summary>{escape(title)}</summary>{body}</details>"
+
+
+def listed(items: Iterable[str], style: str = "") -> str:
+    """An unordered list; items are HTML already, `style` is a class of the style sheet."""
+    opened = f'<ul class="{style}">' if style else "<ul>"
+    return f"{opened}{''.join(f'<li>{item}</li>' for item in items)}</ul>"
 
 
 def sentence(text: str) -> str:

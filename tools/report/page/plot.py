@@ -21,6 +21,8 @@ Array = NDArray[np.float64]
 UNITS_PER_PIXEL = 10
 BAND_POINTS = 400
 PIXELS_PER_TICK = {"x": 90, "y": 30}
+SIGMAS = 2.0  # half width of bands
+SMALLEST = 1e-3  # of a curve: the lower end of a band on a logarithmic axis
 POINTS = 1500  # about one and a half per pixel of a wide plot
 
 
@@ -58,6 +60,12 @@ class Bars:
 
 
 Mark = Curve | Band | Bars
+
+
+def measured_with_band(x: Array, size: Array, sigma: Array, name: str = "two sigmas") -> list[Mark]:
+    """A measured curve in the band of its uncertainty, whose lower end stays above zero for a logarithmic axis."""
+    low, high = np.maximum(size - SIGMAS * sigma, SMALLEST * size), size + SIGMAS * sigma
+    return [Band(name, x, low, high, "k0"), Curve("measured", x, size, "k0")]
 
 
 @dataclass(frozen=True)

@@ -4,10 +4,9 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from html import escape
 
 from jointscope.graphs.rest_search.discover_rests import RestDiscovery
-from jointscope.tools.report.page.page import Section, page, table
+from jointscope.tools.report.page.page import Section, page, text_cells
 from jointscope.tools.report.rests_report import rest_sections
 from jointscope.tools.terminal.searches.rest_search_text import headline, ranking_table, step_table, untestable_said
 
@@ -34,15 +33,11 @@ def _steps(found: RestDiscovery) -> Section:
     )
     if found.stop_reason:
         lead += f" The search ended because {found.stop_reason}."
-    return Section("steps", "What was missing", _escaped(head, rows, range(2, len(head))), lead)
+    return Section("steps", "What was missing", text_cells(head, rows, range(2, len(head))), lead)
 
 
 def _ranking(found: RestDiscovery) -> Section:
     """What the last model may lack."""
     head, rows = ranking_table([c for c in found.candidates if c.verdict != "untestable"])
     lead = " ".join([headline(found), *untestable_said(found.candidates)])
-    return Section("ranking", "What may be missing still", _escaped(head, rows, range(2, 7)), escape(lead))
-
-
-def _escaped(head: Sequence[str], rows: Sequence[Sequence[str]], right: Sequence[int]) -> str:
-    return table([escape(cell) for cell in head], [[escape(cell) for cell in row] for row in rows], right)
+    return Section("ranking", "What may be missing still", text_cells(head, rows, range(2, 7)), lead)

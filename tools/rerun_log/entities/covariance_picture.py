@@ -13,7 +13,7 @@ from jointscope.graphs.calibration.calibration_result import CalibrationResult
 from jointscope.graphs.calibration.found_values import share_of_value
 from jointscope.robots.parts.relative_sigma import relative_sigma
 from jointscope.tools.presentation.numbers import with_sigma
-from jointscope.tools.rerun_log.entities.viewer_text import viewer_text
+from jointscope.tools.rerun_log.entities.tab_contents import send_document
 
 if TYPE_CHECKING:
     import rerun as rr
@@ -30,8 +30,7 @@ def send_covariance(stream: rr.RecordingStream, result: CalibrationResult) -> No
 
     if len(result.names):
         stream.log("covariance/correlation", rr.Image(correlation_picture(result)), static=True)
-    text = rr.TextDocument(viewer_text(parameter_table(result)), media_type=rr.MediaType.MARKDOWN)
-    stream.log("covariance/parameters", text, static=True)
+    send_document(stream, "covariance/parameters", parameter_table(result))
 
 
 def covariance_views() -> rrb.Horizontal:

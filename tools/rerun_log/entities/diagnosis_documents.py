@@ -5,7 +5,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
 
 from jointscope.graphs.discovery.diagnosis_result import Candidate, Diagnosis
 from jointscope.graphs.discovery.discovery_result import Discovery
@@ -19,19 +18,8 @@ from jointscope.tools.presentation.model_answer import (
 )
 from jointscope.tools.presentation.numbers import significant
 from jointscope.tools.report.page.page import sentence
-from jointscope.tools.rerun_log.entities.viewer_text import viewer_text
-
-if TYPE_CHECKING:
-    import rerun as rr
 
 TOLD = 10  # candidates whose reasons are told although they are absent
-
-
-def send_document(stream: rr.RecordingStream, path: str, markdown: str) -> None:
-    """A text with letters that the viewer has."""
-    import rerun as rr
-
-    stream.log(path, rr.TextDocument(viewer_text(markdown), media_type=rr.MediaType.MARKDOWN), static=True)
 
 
 def diagnosis_markdown(result: Diagnosis) -> str:

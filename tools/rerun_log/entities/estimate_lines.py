@@ -14,7 +14,8 @@ from jointscope.robots.model.robot import Robot
 from jointscope.robots.parts.state_layout import StateLayout
 from jointscope.tools.presentation.settled import settled_reach
 from jointscope.tools.rerun_log.entities.columns import GREY, JOINT_COLOURS, send_band, send_lines
-from jointscope.tools.rerun_log.entities.viewer_text import entity, viewer_text
+from jointscope.tools.rerun_log.entities.tab_contents import plot_columns, plot_view
+from jointscope.tools.rerun_log.entities.viewer_text import entity
 
 if TYPE_CHECKING:
     import rerun as rr
@@ -60,25 +61,18 @@ def send_corrections(stream: rr.RecordingStream, robot: Robot, states: StateSeri
 
 def correction_views(robot: Robot, states: StateSeries, lagged: StateSeries) -> rrb.Horizontal:
     """One column per joint, one row per quantity."""
-    import rerun.blueprint as rrb
 
     def view(joint: str, i: int, name: str, unit: str, sigma: Array) -> rrb.TimeSeriesView:
         top = 4.5 * float(np.median(sigma[:, i])) if len(sigma) else 0.0
-        return rrb.TimeSeriesView(
-            origin="/" + entity("corrections", joint, name),
-            name=viewer_text(f"{joint} {name}, newest - smoothed [{unit}]"),
-            plot_legend=rrb.PlotLegend(visible=False),
-            axis_y=rrb.ScalarAxis(range=(-top, top)) if top > 0.0 else None,
-        )
+        title, reach = f"{joint} {name}, newest - smoothed [{unit}]", (-top, top) if top > 0.0 else None
+        return plot_view(title, "corrections", joint, name, legend=False, reach=reach)
 
     rows = corrections(robot, states, lagged)
-    return rrb.Horizontal(
-        *(
-            rrb.Vertical(*(view(joint, i, c.name, robot.unit_at(joint, c.unit), c.sigma) for c in rows))
-            for i, joint in enumerate(robot.joints)
-        ),
-        name="newest - smoothed",
-    )
+    columns = [
+        [view(joint, i, c.name, robot.unit_at(joint, c.unit), c.sigma) for c in rows]
+        for i, joint in enumerate(robot.joints)
+    ]
+    return plot_columns(columns, "newest - smoothed")
 
 
 def estimate_views(robot: Robot) -> rrb.Horizontal:
@@ -92,16 +86,8 @@ def joint_views(robot: Robot, joint: str) -> rrb.Vertical:
     """The states of one joint."""
     import rerun.blueprint as rrb
 
-    return rrb.Vertical(
-        *(
-            rrb.TimeSeriesView(
-                origin="/" + entity("states", joint, name),
-                name=viewer_text(f"{joint} {name} [{robot.unit_at(joint, unit)}]"),
-                plot_legend=rrb.PlotLegend(visible=False),
-            )
-            for name, unit in QUANTITIES
-        )
-    )
+    titles = {name: f"{joint} {name} [{robot.unit_at(joint, unit)}]" for name, unit in QUANTITIES}
+    return rrb.Vertical(*(plot_view(title, "states", joint, name, legend=False) for name, title in titles.items()))
 
 
 def sigma_views(robot: Robot, states: StateSeries | None = None) -> rrb.Vertical:
@@ -110,12 +96,10 @@ def sigma_views(robot: Robot, states: StateSeries | None = None) -> rrb.Vertical
 
     views = []
     for name, unit in SIGMAS:
-        axis = None
-        if states is not None and len(states.times):
-            top = settled_reach(states.times, _sigmas(robot, states)[name])
-            axis = rrb.ScalarAxis(range=(0.0, top)) if top > 0.0 else None
-        title = viewer_text(f"sigma of {name} [{robot.unit(unit)}]")
-        views.append(rrb.TimeSeriesView(origin="/" + entity("sigma", name), name=title, axis_y=axis))
+        known = states if states is not None and len(states.times) else None
+        top = 0.0 if known is None else settled_reach(known.times, _sigmas(robot, known)[name])
+        reach = (0.0, top) if top > 0.0 else None
+        views.append(plot_view(f"sigma of {name} [{robot.unit(unit)}]", "sigma", name, reach=reach))
     return rrb.Vertical(*views, name="sigmas")
 
 
@@ -123,18 +107,8 @@ def bias_views(robot: Robot, adapted: tuple[str, ...]) -> rrb.Vertical:
     """One plot per gyro, accelerometer and adapted parameter."""
     import rerun.blueprint as rrb
 
-    views = [
-        rrb.TimeSeriesView(
-            origin="/" + entity("bias", sensor.name), name=viewer_text(f"bias of {sensor.name} [{sensor.units[0]}]")
-        )
-        for sensor in robot.biased
-    ]
-    views += [
-        rrb.TimeSeriesView(
-            origin="/" + entity("parameters", name), name=viewer_text(f"{name} [{robot.parameter(name).unit}]")
-        )
-        for name in adapted
-    ]
+    views = [plot_view(f"bias of {s.name} [{s.units[0]}]", "bias", s.name) for s in robot.biased]
+    views += [plot_view(f"{name} [{robot.parameter(name).unit}]", "parameters", name) for name in adapted]
     return rrb.Vertical(*views, name="biases and parameters" if adapted else "biases")
 
 

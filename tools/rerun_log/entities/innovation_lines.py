@@ -13,7 +13,8 @@ from jointscope.robots.model.robot import Robot
 from jointscope.robots.parts.sensors import Sensor
 from jointscope.tools.report.sections.replay.innovations import reach
 from jointscope.tools.rerun_log.entities.columns import GREY, JOINT_COLOURS, WHITE, send_band, send_lines, time_column
-from jointscope.tools.rerun_log.entities.viewer_text import entity, viewer_text
+from jointscope.tools.rerun_log.entities.tab_contents import plot_columns, plot_view
+from jointscope.tools.rerun_log.entities.viewer_text import entity
 
 if TYPE_CHECKING:
     import rerun as rr
@@ -57,42 +58,23 @@ def send_nis(stream: rr.RecordingStream, innovations: Innovations) -> None:
 
 def innovation_views(robot: Robot, innovations: Innovations | None = None) -> rrb.Horizontal:
     """One column per sensor, one plot per channel; known innovations say how far each axis must reach."""
-    import rerun.blueprint as rrb
 
-    return rrb.Horizontal(
-        *(
-            rrb.Vertical(
-                *(
-                    rrb.TimeSeriesView(
-                        origin="/" + entity("residuals", name, channel),
-                        name=viewer_text(f"{channel} [{sensor.units[j]}]"),
-                        plot_legend=rrb.PlotLegend(visible=False),
-                        axis_y=rrb.ScalarAxis(range=_range(sensor, (innovations or {}).get(name), j)),
-                    )
-                    for j, channel in enumerate(sensor.channels)
-                ),
-                name=viewer_text(name),
-            )
-            for name, sensor in robot.sensors.items()
-        ),
-        name="residuals",
-    )
+    def view(name: str, sensor: Sensor, j: int) -> rrb.TimeSeriesView:
+        channel, reach = sensor.channels[j], _range(sensor, (innovations or {}).get(name), j)
+        return plot_view(f"{channel} [{sensor.units[j]}]", "residuals", name, channel, legend=False, reach=reach)
+
+    sensors = robot.sensors
+    columns = [[view(name, sensor, j) for j in range(len(sensor.channels))] for name, sensor in sensors.items()]
+    return plot_columns(columns, "residuals", list(sensors))
 
 
-def nis_views(robot: Robot, name: str = "NIS", legend: bool = True) -> rrb.Vertical:
+def nis_views(robot: Robot, legend: bool = True) -> rrb.Vertical:
     """One plot per sensor."""
     import rerun.blueprint as rrb
 
+    title = "NIS per degree of freedom, 1 expected"
     return rrb.Vertical(
-        *(
-            rrb.TimeSeriesView(
-                origin="/" + entity("nis", sensor),
-                name=viewer_text(f"{sensor}: NIS per degree of freedom, 1 expected"),
-                plot_legend=rrb.PlotLegend(visible=legend),
-            )
-            for sensor in robot.sensors
-        ),
-        name=name,
+        *(plot_view(f"{sensor}: {title}", "nis", sensor, legend=legend) for sensor in robot.sensors), name="NIS"
     )
 
 

@@ -9,7 +9,8 @@ import numpy as np
 
 from jointscope.graphs.comparison.comparison_result import ComparisonResult
 from jointscope.tools.rerun_log.entities.columns import GREY, JOINT_COLOURS, send_lines
-from jointscope.tools.rerun_log.entities.viewer_text import entity, viewer_text
+from jointscope.tools.rerun_log.entities.tab_contents import plot_columns, plot_view
+from jointscope.tools.rerun_log.entities.viewer_text import entity
 
 if TYPE_CHECKING:
     import rerun as rr
@@ -28,24 +29,17 @@ def send_predictions(stream: rr.RecordingStream, result: ComparisonResult) -> No
 
 def prediction_views(result: ComparisonResult) -> list[rrb.Horizontal]:
     """One tab per kind of prediction, one plot per channel."""
-    import rerun.blueprint as rrb
-
     sensors = result.models[0].sensors if result.models else {}
-    tabs = []
-    for kind, title in KINDS.items():
-        columns = [
-            rrb.Vertical(
-                *(
-                    rrb.TimeSeriesView(
-                        origin="/" + entity(kind, c), name=viewer_text(c if kind == "error" else f"{c} [{unit}]")
-                    )
-                    for c, unit in zip(p.channels, p.units, strict=True)
-                )
-            )
-            for p in sensors.values()
-        ]
-        tabs.append(rrb.Horizontal(*columns, name=title))
-    return tabs
+
+    def view(kind: str, channel: str, unit: str) -> rrb.TimeSeriesView:
+        return plot_view(channel if kind == "error" else f"{channel} [{unit}]", kind, channel)
+
+    return [
+        plot_columns(
+            ([view(kind, *each) for each in zip(p.channels, p.units, strict=True)] for p in sensors.values()), title
+        )
+        for kind, title in KINDS.items()
+    ]
 
 
 def prediction_bytes(result: ComparisonResult) -> int:

@@ -12,6 +12,7 @@ from jointscope.graphs.discovery.missing_torque import MissingTorque
 from jointscope.graphs.discovery.residual_maps import ResidualMap, residual_maps
 from jointscope.tools.report.sections.diagnosis.torque_maps import most_telling
 from jointscope.tools.rerun_log.entities.columns import GREY, JOINT_COLOURS, WHITE, Colour, send_band, send_lines
+from jointscope.tools.rerun_log.entities.tab_contents import plot_columns, plot_view
 from jointscope.tools.rerun_log.entities.viewer_text import entity, viewer_text
 
 if TYPE_CHECKING:
@@ -48,15 +49,8 @@ def torque_views(missing: MissingTorque, root: str, name: str) -> list[rrb.Conta
 
     n = len(missing.joints)
     columns = [
-        rrb.Vertical(
-            *(
-                rrb.TimeSeriesView(
-                    origin="/" + entity(root, "torque", row), name=viewer_text(f"{row} [{missing.unit(row, 'N m')}]")
-                )
-                for row in missing.rows[side * n : (side + 1) * n]
-            )
-        )
-        for side in (0, 1)
+        [plot_view(f"{row} [{missing.unit(row, 'N m')}]", root, "torque", row) for row in side]
+        for side in (missing.rows[:n], missing.rows[n : 2 * n])
     ]
     bounds = rrb.VisualBounds2D(x_range=(-0.15 * WIDTH, 1.15 * WIDTH), y_range=(-0.2 * HEIGHT, 1.2 * HEIGHT))
     maps = [
@@ -67,7 +61,7 @@ def torque_views(missing: MissingTorque, root: str, name: str) -> list[rrb.Conta
         )
         for k, m in enumerate(_maps(missing))
     ]
-    tabs: list[rrb.Container] = [rrb.Horizontal(*columns, name=viewer_text(f"missing torque{name}"))]
+    tabs: list[rrb.Container] = [plot_columns(columns, viewer_text(f"missing torque{name}"))]
     if maps:
         tabs.append(
             rrb.Grid(*maps, grid_columns=3, name=viewer_text(f"its shape: blue median, grey middle half{name}"))

@@ -144,8 +144,7 @@ class SampledTorque(SampledSensor):
     ):
         super().__init__(sensor, engine, sampling, stamps, seed)
         self._mujoco, self._model, self._link, self._sigmas = load_mujoco(), engine.model, engine.link, sensor.sigmas
-        values = {name: parameter.value for name, parameter in robot.parameters.items()}
-        self._scale, self._offset = sensor.scale_and_offset(values)
+        self._scale, self._offset = sensor.scale_and_offset(robot.values)
         self._noise = random_stream(seed, "noise", sensor.name).standard_normal((len(stamps), len(sensor.joints)))
 
     def given_out(self, trajectory: Trajectory, rows: Rows) -> Array:

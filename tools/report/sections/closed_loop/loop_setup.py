@@ -9,7 +9,7 @@ from jointscope.tools.closed_loop.closed_loop_result import ClosedLoopResult
 from jointscope.tools.closed_loop.planning.hitting_plan import COMMAND_SHARE
 from jointscope.tools.closed_loop.planning.optimal_gains import WORTH_FULL_COMMAND
 from jointscope.tools.presentation.numbers import significant
-from jointscope.tools.report.page.page import Section, foldable, table
+from jointscope.tools.report.page.page import Section, foldable, listed, table
 from jointscope.tools.simulator.loop.controller import GAIN
 
 
@@ -34,8 +34,8 @@ def loop_setup(result: ClosedLoopResult) -> Section:
         f"delay {1e3 * sampling['transport_delay']:g} ms, {100 * sampling['drop']:g} % "
         "lost. The controllers tick at 1 kHz.",
     ]
-    items = "".join(f"<li>{escape(text)}</li>" for text in sentences)
-    return Section("setup", "How it was done", f'<ul class="steps">{items}</ul>{_parameters(result)}')
+    steps = listed(map(escape, sentences), "steps")
+    return Section("setup", "How it was done", f"{steps}{_parameters(result)}")
 
 
 def _parameters(result: ClosedLoopResult) -> str:

@@ -10,7 +10,7 @@ from html import escape
 from jointscope.graphs.comparison.failure_analysis import ChannelFailure, FailureAnalysis
 from jointscope.tools.presentation.candidate_numbers import p_text
 from jointscope.tools.presentation.numbers import minus, percent, significant
-from jointscope.tools.report.page.page import Section, foldable, sentence, table
+from jointscope.tools.report.page.page import Section, foldable, listed, sentence, table
 
 SHOWN = 3  # sentences; more fold
 BAR = 280  # [px]
@@ -42,8 +42,7 @@ def channel_failures(failure: FailureAnalysis, id_: str = "channels") -> Section
 
 
 def _list(sentences: Sequence[str]) -> str:
-    lines = "".join(f"<li>{escape(sentence(text))}</li>" for text in sentences)
-    return f'<ul class="steps">{lines}</ul>' if lines else ""
+    return listed((escape(sentence(text)) for text in sentences), "steps") if sentences else ""
 
 
 def _row(name: str, channel: ChannelFailure, worst: float) -> list[str]:

@@ -13,7 +13,7 @@ from jointscope.tools.report.page.page import Section
 PRINTED = 0.1
 
 
-def failure_correlations(failure: FailureAnalysis, id_: str = "correlations") -> Section:
+def failure_correlations(failure: FailureAnalysis) -> Section:
     """One row per signal, one column per channel."""
     lead = (
         "Correlation of the 0.1 s ahead error of each channel with velocities, positions, loads and commands. Blue: "
@@ -25,12 +25,12 @@ def failure_correlations(failure: FailureAnalysis, id_: str = "correlations") ->
     signals = sorted(found, key=lambda signal: signal.partition(".")[0])
     title = "What the errors go along with"
     if not signals:
-        return Section(id_, title, "<p>Correlations were not computed.</p>", lead)
+        return Section("correlations", title, "<p>Correlations were not computed.</p>", lead)
     rows = [
         (signal, [_cell(name, signal, c.correlations.get(signal, math.nan)) for name, c in failure.channels.items()])
         for signal in signals
     ]
-    return Section(id_, title, heat_table("signal", list(failure.channels), rows), lead)
+    return Section("correlations", title, heat_table("signal", list(failure.channels), rows), lead)
 
 
 def _cell(channel: str, signal: str, r: float) -> HeatCell:

@@ -9,14 +9,16 @@ from jointscope.graphs.discovery.diagnosis_result import Diagnosis
 from jointscope.tools.report.page.page import Section, table
 
 
-def noise_levels(result: Diagnosis, id_: str = "levels") -> Section:
+def noise_levels(result: Diagnosis) -> Section:
     """One row per level."""
     lead = (
         "Noise that was fitted beside an incomplete model swallows part of what is missing. A candidate that is first "
         "at every level does not owe its place to the noise."
     )
     if not result.noise_levels:
-        return Section(id_, "Does the noise decide?", "<p>The ranking was computed at one noise level only.</p>", lead)
+        return Section(
+            "levels", "Does the noise decide?", "<p>The ranking was computed at one noise level only.</p>", lead
+        )
     most = max(len(labels) for labels in result.noise_levels.values())
     first = [labels[0] for labels in result.noise_levels.values() if labels]
     rows = [
@@ -30,7 +32,7 @@ def noise_levels(result: Diagnosis, id_: str = "levels") -> Section:
         else "The first place changes with the noise: take the ranking with care."
     )
     head = ["process noise", *(f"{k + 1}" for k in range(most))]
-    return Section(id_, "Does the noise decide?", f"<p>{escape(said)}</p>{table(head, rows)}", lead)
+    return Section("levels", "Does the noise decide?", f"<p>{escape(said)}</p>{table(head, rows)}", lead)
 
 
 def _label(label: str, first: list[str]) -> str:

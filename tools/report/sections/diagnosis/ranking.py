@@ -17,7 +17,7 @@ from jointscope.tools.presentation.candidate_numbers import (
 )
 from jointscope.tools.presentation.model_answer import enumerated
 from jointscope.tools.presentation.numbers import significant
-from jointscope.tools.report.page.page import Section, foldable, sentence
+from jointscope.tools.report.page.page import Section, foldable, listed, sentence
 
 SHOWN = 10
 BAR = 60  # [px]
@@ -89,9 +89,9 @@ def _alike(c: Candidate) -> str:
 def _why(c: Candidate) -> str:
     if not c.reasons:
         return ""
-    reasons = "".join(f"<li>{escape(sentence(text))}</li>" for text in c.reasons)
+    reasons = listed(escape(sentence(text)) for text in c.reasons)
     opened = " open" if c.verdict == "missing" else ""
-    return f"<details{opened}><summary>why</summary><ul>{reasons}</ul></details>"
+    return f"<details{opened}><summary>why</summary>{reasons}</details>"
 
 
 def _explains(c: Candidate) -> str:

@@ -22,7 +22,7 @@ SEGMENT = 2.0  # [s] resolves half a hertz
 POINTS = 160  # on the logarithmic axis
 
 
-def torque_over_time(missing: MissingTorque | None, id_: str = "torque") -> Section:
+def torque_over_time(missing: MissingTorque | None) -> Section:
     """The equations that lack most, the others folded; then all spectra."""
     title = "The missing torque over time"
     lead = (
@@ -30,7 +30,7 @@ def torque_over_time(missing: MissingTorque | None, id_: str = "torque") -> Sect
         "which frequencies: friction is low and broad, cogging follows the speed, a resonance is a peak."
     )
     if missing is None or not len(missing.times):
-        return Section(id_, title, NOT_ESTIMATED, lead)
+        return Section("torque", title, NOT_ESTIMATED, lead)
     excess = np.sqrt(np.mean(missing.torque**2, axis=0)) / np.maximum(np.median(missing.sigma, axis=0), 1e-12)
     order = [int(i) for i in np.argsort(-excess)]
     keys = [Key("missing torque", "m0"), Key("±2 sigma", "soft", "band"), *candidate_keys(missing)]
@@ -40,7 +40,7 @@ def torque_over_time(missing: MissingTorque | None, id_: str = "torque") -> Sect
             f"{len(order) - SHOWN} more equations", figure(_panels(missing, order[SHOWN:]), keys, group=GROUP)
         )
     body += "<h3>Spectrum</h3>" + _spectra(missing, order)
-    return Section(id_, title, body, lead)
+    return Section("torque", title, body, lead)
 
 
 def _panels(missing: MissingTorque, rows: list[int]) -> list[str]:

@@ -13,7 +13,7 @@ from jointscope.tools.report.page.page import Section, foldable, sentence, table
 SHOWN = 8
 
 
-def untestable(result: Diagnosis, id_: str = "untestable") -> Section:
+def untestable(result: Diagnosis) -> Section:
     """Untestable candidates, then pairs that look alike."""
     lead = (
         "Not testable is not absent: were the effect there in a typical size, it would not show in this motion. "
@@ -24,7 +24,7 @@ def untestable(result: Diagnosis, id_: str = "untestable") -> Section:
     alike = [c for c in result.candidates if c.look_alikes and c.verdict in ("missing", "possible")]
     if alike:
         parts.append("<h3>Effects that look alike here</h3>" + _alike(alike))
-    return Section(id_, "What these recordings cannot show", "".join(parts), lead)
+    return Section("untestable", "What these recordings cannot show", "".join(parts), lead)
 
 
 def _weak(candidates: list[Candidate]) -> str:

@@ -7,19 +7,14 @@ from html import escape
 
 from jointscope.graphs.fixed_lag.replay.replay_result import ReplayResult
 from jointscope.tools.presentation.numbers import significant
+from jointscope.tools.report.page.answer_box import Figures, judged_box
 from jointscope.tools.report.page.page import Section
-from jointscope.tools.report.sections.calibration.verdict import check_line
 from jointscope.tools.verdicts.replay_judgement import diagnose_command, judge_replay, suspects
 
 
 def replay_verdict(result: ReplayResult) -> Section:
     """Verdict box: headline, big numbers, checks; below it the command that follows from an alarm."""
-    judgement = judge_replay(result)
-    checks = "".join(check_line(check) for check in judgement.checks)
-    body = (
-        f'<div class="verdict {judgement.level}"><p class="answer">{escape(judgement.headline)}</p>'
-        f'{_big_numbers(result)}<ul class="checks">{checks}</ul></div>'
-    )
+    body = judged_box(judge_replay(result), _figures(result))
     off = suspects(result)
     if off:
         names = ", ".join(s.sensor for s in off)
@@ -28,11 +23,11 @@ def replay_verdict(result: ReplayResult) -> Section:
     return Section("verdict", "Can this estimate be trusted?", body)
 
 
-def _big_numbers(result: ReplayResult) -> str:
+def _figures(result: ReplayResult) -> Figures:
     latency = result.latency
     speed = result.recording_seconds / result.wall_seconds if result.wall_seconds > 0.0 else float("nan")
     received = sum(result.status.received.values()) or result.messages
-    figures = [
+    return [
         (significant(result.nis_mean), "mean NIS per degree of freedom; 1 is expected"),
         (
             f"{significant(1e3 * latency.p50)} <small>ms</small>",
@@ -41,8 +36,3 @@ def _big_numbers(result: ReplayResult) -> str:
         (f"{significant(speed, 2)}<small>×</small>", f"real time: {significant(result.wall_seconds)} s of work"),
         (f"{result.dropped}", f"of {received} messages left out"),
     ]
-    return (
-        '<div class="figures">'
-        + "".join(f"<div><b>{number}</b><span>{escape(text)}</span></div>" for number, text in figures)
-        + "</div>"
-    )
