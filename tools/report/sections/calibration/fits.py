@@ -6,7 +6,8 @@ from __future__ import annotations
 from jointscope.graphs.calibration.calibration_result import BagFit, CalibrationResult
 from jointscope.tools.presentation.sensor_signals import COLOURS, SignalRow, liveliest, points_per_curve, signal_rows
 from jointscope.tools.report.page.page import Key, Section, figure
-from jointscope.tools.report.page.plot import Axes, Curve, plot
+from jointscope.tools.report.page.panels import below_each_other
+from jointscope.tools.report.page.plot import Axes, Curve
 from jointscope.tools.report.sections.calibration.per_bag import per_bag
 
 
@@ -39,12 +40,15 @@ def fits(result: CalibrationResult) -> Section:
 
 
 def _panels(rows: list[SignalRow], limits: tuple[float, float], height: int, points: int) -> list[str]:
-    panels = []
-    for k, row in enumerate(rows):
-        last = k == len(rows) - 1
-        axes = Axes(f"{row.title} [{row.unit}]", "time [s]" if last else "", height=height + 28 * last, x_range=limits)
-        panels.append(plot(axes, [*_measured(row, points), *_predicted(row, points)]))
-    return panels
+    return below_each_other(
+        [
+            (
+                Axes(f"{row.title} [{row.unit}]", height=height, x_range=limits),
+                [*_measured(row, points), *_predicted(row, points)],
+            )
+            for row in rows
+        ]
+    )
 
 
 def _measured(row: SignalRow, points: int) -> list[Curve]:

@@ -12,7 +12,8 @@ from jointscope.robots.model.lasting_torques import lasting_torques
 from jointscope.tools.presentation.numbers import significant
 from jointscope.tools.presentation.sensor_signals import COLOURS
 from jointscope.tools.report.page.page import Key, Section, figure, table
-from jointscope.tools.report.page.plot import Axes, Curve, plot
+from jointscope.tools.report.page.panels import below_each_other
+from jointscope.tools.report.page.plot import Axes, Curve
 from jointscope.tools.report.sections.calibration.per_bag import per_bag
 from jointscope.tools.verdicts.judgement import equation_names
 from jointscope.tools.verdicts.whiteness import strength
@@ -36,14 +37,13 @@ def noise(result: CalibrationResult) -> Section:
         edges, rms = strength(bag.ticks[:-1], bag.process / bag.process_sigma)
         t = 0.5 * (edges[1:] + edges[:-1])
         panels, layout = [], result.robot.layout
-        for k, (side, rows) in enumerate((("link", layout.joint_link), ("motor", layout.motor_row))):
+        for side, rows in (("link", layout.joint_link), ("motor", layout.motor_row)):
             curves = [Curve(joint, t, rms[:, rows[i]], COLOURS[i % 6]) for i, joint in enumerate(layout.joints)]
             title = f"residual of the {side} equations, rms over 0.25 s [sigma]"
             limits = (float(bag.ticks[0]), float(bag.ticks[-1]))
-            label = "time [s]" if k else ""
-            panels.append(plot(Axes(title, label, height=150 + 28 * k, x_range=limits, levels=[(1.0, "")]), curves))
+            panels.append((Axes(title, height=150, x_range=limits, levels=[(1.0, "")]), curves))
         keys = [Key(joint, COLOURS[i % 6]) for i, joint in enumerate(result.robot.joints)]
-        return figure(panels, keys, group=group)
+        return figure(below_each_other(panels), keys, group=group)
 
     estimated = "estimated" if result.robot.noise.estimate else "given, not estimated,"
     lead = (

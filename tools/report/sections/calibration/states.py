@@ -12,7 +12,8 @@ from jointscope.robots.model.robot import Robot
 from jointscope.tools.presentation.numbers import prefixed
 from jointscope.tools.presentation.sensor_signals import COLOURS, liveliest, points_per_curve
 from jointscope.tools.report.page.page import Key, Section, figure
-from jointscope.tools.report.page.plot import Axes, Band, Curve, Mark, plot
+from jointscope.tools.report.page.panels import below_each_other, in_band
+from jointscope.tools.report.page.plot import Axes, Curve, Mark
 from jointscope.tools.report.sections.calibration.per_bag import per_bag
 
 Limits = tuple[float, float]
@@ -49,59 +50,29 @@ def _with_bands(bag: BagFit, robot: Robot, limits: Limits, points: int) -> list[
     q_link, v_link, q_motor = (bag.states[:, k * n : (k + 1) * n] for k in range(3))
     deflection = q_link - q_motor
     factor, unit = prefixed(float(np.max(np.abs(deflection), initial=0.0)), robot.unit("rad"))
-    panels = [
-        _panel(
-            f"deflection [{unit}]", bag, factor * deflection, factor * bag.sigmas[:, :n], joints, limits, points, ""
-        ),
-        _panel(
-            f"link velocity [{robot.unit('rad/s')}]",
-            bag,
-            v_link,
-            bag.sigmas[:, n : 2 * n],
-            joints,
-            limits,
-            points,
-            "time [s]",
-        ),
-    ]
-    return panels
-
-
-def _panel(
-    title: str,
-    bag: BagFit,
-    values: np.ndarray,
-    sigmas: np.ndarray,
-    joints: tuple[str, ...],
-    limits: Limits,
-    points: int,
-    x_label: str,
-) -> str:
-    marks: list[Mark] = []
-    for i, joint in enumerate(joints):
-        low, high = values[:, i] - 3.0 * sigmas[:, i], values[:, i] + 3.0 * sigmas[:, i]
-        marks.append(Band("±3 sigma", bag.ticks, low, high, COLOURS[i % 6]))
-        marks.append(Curve(joint, bag.ticks, values[:, i], COLOURS[i % 6], points=points))
-    return plot(Axes(title, x_label, height=190 + 28 * bool(x_label), x_range=limits), marks)
+    rows = (
+        (f"deflection [{unit}]", factor * deflection, factor * bag.sigmas[:, :n]),
+        (f"link velocity [{robot.unit('rad/s')}]", v_link, bag.sigmas[:, n : 2 * n]),
+    )
+    panels = []
+    for title, values, sigmas in rows:
+        marks: list[Mark] = []
+        for i, joint in enumerate(joints):
+            marks += in_band(joint, bag.ticks, values[:, i], sigmas[:, i], COLOURS[i % 6], points)
+        panels.append((Axes(title, height=190, x_range=limits), marks))
+    return below_each_other(panels)
 
 
 def _sigmas(bag: BagFit, robot: Robot, limits: Limits) -> list[str]:
     joints, n = robot.joints, robot.n
     panels = []
-    for k, (title, unit) in enumerate(
-        (("q_link", "rad"), ("v_link", "rad/s"), ("q_motor", "rad"), ("v_motor", "rad/s"))
-    ):
+    names = (("q_link", "rad"), ("v_link", "rad/s"), ("q_motor", "rad"), ("v_motor", "rad/s"))
+    for k, (title, unit) in enumerate(names):
         sigma = bag.sigmas[:, k * n : (k + 1) * n]
         factor, prefix_unit = prefixed(float(np.median(sigma)), robot.unit(unit))
         curves = [
             Curve(joint, bag.ticks, factor * sigma[:, i], COLOURS[i % 6], points=500) for i, joint in enumerate(joints)
         ]
-        axes = Axes(
-            f"sigma of {title} [{prefix_unit}]",
-            "time [s]" if k == 3 else "",
-            height=110 + 28 * (k == 3),
-            x_range=limits,
-            y_range=(0.0, 1.3 * factor * float(np.quantile(sigma, 0.995))),
-        )
-        panels.append(plot(axes, curves))
-    return panels
+        reach = (0.0, 1.3 * factor * float(np.quantile(sigma, 0.995)))
+        panels.append((Axes(f"sigma of {title} [{prefix_unit}]", height=110, x_range=limits, y_range=reach), curves))
+    return below_each_other(panels)

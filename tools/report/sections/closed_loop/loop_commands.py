@@ -6,7 +6,8 @@ from __future__ import annotations
 from jointscope.robots.units import si_unit
 from jointscope.tools.closed_loop.closed_loop_result import SOURCES, ClosedLoopResult, LoopRun
 from jointscope.tools.report.page.page import Section, figure
-from jointscope.tools.report.page.plot import Axes, Curve, Mark, plot
+from jointscope.tools.report.page.panels import below_each_other
+from jointscope.tools.report.page.plot import Axes, Curve, Mark
 from jointscope.tools.report.sections.closed_loop.loop_colours import COLOURS, by_controller, source_keys
 
 
@@ -28,8 +29,7 @@ def _panels(result: ClosedLoopResult, runs: list[LoopRun]) -> list[str]:
             Curve(SOURCES[run.source], plan.times[rows], run.commands[rows, i] / result.full[i], COLOURS[run.source])
             for run in sorted(runs, key=lambda run: run.tracking.chatter, reverse=True)
         ]
-        last = i == len(result.robot.joints) - 1
         full = f"{result.full[i]:g} {si_unit(result.robot.command.unit)}".replace(" 1", "")
         title = f"{joint}, share of {full}" if result.robot.command.unit != "duty" else f"{joint}, duty cycle"
-        panels.append(plot(Axes(title, "time [s]" if last else "", height=120 + 28 * last), marks))
-    return panels
+        panels.append((Axes(title, height=120), marks))
+    return below_each_other(panels)

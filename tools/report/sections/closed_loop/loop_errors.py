@@ -8,7 +8,8 @@ import numpy as np
 from jointscope.tools.closed_loop.closed_loop_result import SOURCES, ClosedLoopResult, LoopRun
 from jointscope.tools.presentation.numbers import minus, prefixed, significant
 from jointscope.tools.report.page.page import Key, Section, figure, table
-from jointscope.tools.report.page.plot import Axes, Curve, Mark, plot
+from jointscope.tools.report.page.panels import below_each_other
+from jointscope.tools.report.page.plot import Axes, Curve, Mark
 from jointscope.tools.report.sections.closed_loop.loop_colours import COLOURS, by_controller, source_keys
 
 LEAST = 1e-5  # [m] below this the logarithmic axis ends
@@ -28,15 +29,13 @@ def _panels(result: ClosedLoopResult, runs: list[LoopRun]) -> list[str]:
     distance: list[Mark] = [
         _curve(run, t, np.maximum(1e3 * np.linalg.norm(run.head - result.head, axis=1), 1e3 * LEAST)) for run in runs
     ]
-    panels = [plot(Axes("head, distance from the plan [mm]", "", height=190, log_y=True), distance)]
+    panels = [(Axes("head, distance from the plan [mm]", height=190, log_y=True), distance)]
     worst = max(float(np.max(np.abs(run.states[:, :n] - result.plan.q))) for run in runs)
     factor, unit = prefixed(worst, "rad")
     for i, joint in enumerate(result.robot.joints):
-        last = i == n - 1
         errors: list[Mark] = [_curve(run, t, factor * (run.states[:, i] - result.plan.q[:, i])) for run in runs]
-        axes = Axes(f"{joint} link, true − planned [{unit}]", "time [s]" if last else "", height=120 + 28 * last)
-        panels.append(plot(axes, errors))
-    return panels
+        panels.append((Axes(f"{joint} link, true − planned [{unit}]", height=120), errors))
+    return below_each_other(panels)
 
 
 def _planned(result: ClosedLoopResult) -> str:
@@ -44,15 +43,13 @@ def _planned(result: ClosedLoopResult) -> str:
     t, names = result.plan.times, result.robot.joints
     hits = [hit.time for hit in result.plan.hits]
     panels = []
-    for k, (title, values) in enumerate(
-        (("planned link angle [rad]", result.plan.q), ("planned velocity [rad/s]", result.plan.v))
-    ):
+    for title, values in (("planned link angle [rad]", result.plan.q), ("planned velocity [rad/s]", result.plan.v)):
         marks: list[Mark] = [Curve(name, t, values[:, i], f"k{i % 6}") for i, name in enumerate(names)]
         at = np.array([values[result.plan.tick(time)] for time in hits])
         marks += [_dots(f"hit {names[i]}", np.array(hits), at[:, i], f"k{i % 6}") for i in range(len(names))]
-        panels.append(plot(Axes(title, "time [s]" if k else "", height=150 + 28 * k), marks))
+        panels.append((Axes(title, height=150), marks))
     keys = [Key(name, f"k{i % 6}") for i, name in enumerate(names)]
-    return "<h3>The plan</h3>" + figure(panels, keys, "Dots are the hits.", group="loop")
+    return "<h3>The plan</h3>" + figure(below_each_other(panels), keys, "Dots are the hits.", group="loop")
 
 
 def _dots(name: str, times: np.ndarray, values: np.ndarray, colour: str) -> Curve:

@@ -8,7 +8,8 @@ import numpy as np
 from jointscope.tools.closed_loop.closed_loop_result import SOURCES, ClosedLoopResult, LoopRun
 from jointscope.tools.presentation.numbers import prefixed, significant
 from jointscope.tools.report.page.page import Section, figure, table
-from jointscope.tools.report.page.plot import Axes, Curve, Mark, plot
+from jointscope.tools.report.page.panels import below_each_other
+from jointscope.tools.report.page.plot import Axes, Curve, Mark
 from jointscope.tools.report.sections.closed_loop.loop_colours import COLOURS, by_controller, source_keys, swatch
 
 NAMES = ("q_link", "v_link", "q_motor", "v_motor")
@@ -51,15 +52,14 @@ def _panels(result: ClosedLoopResult, runs: list[LoopRun]) -> list[str]:
     rows = slice(plan.tick(hit.start - 0.1), plan.tick(hit.back + 0.2) + 1)
     t, panels = plan.times[rows], []
     quantities = [(0, "link angle", "rad"), (n, "link velocity", "rad/s")]
-    for k, (first, name, unit) in enumerate(quantities):
+    for first, name, unit in quantities:
         errors = [run.estimates[rows, first : first + n] - run.states[rows, first : first + n] for run in runs]
         factor, prefixed_unit = prefixed(max(float(np.max(np.abs(e))) for e in errors), unit)
         for i, joint in enumerate(result.robot.joints):
-            last = k == 1 and i == n - 1
             marks: list[Mark] = [
                 Curve(SOURCES[run.source], t, factor * e[:, i], COLOURS[run.source])
                 for run, e in zip(reversed(runs), reversed(errors), strict=True)
             ]
             title = f"{joint} {name}, known − true [{prefixed_unit}]"
-            panels.append(plot(Axes(title, "time [s]" if last else "", height=110 + 28 * last), marks))
-    return panels
+            panels.append((Axes(title, height=110), marks))
+    return below_each_other(panels)

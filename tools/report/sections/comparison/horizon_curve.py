@@ -8,7 +8,8 @@ import numpy as np
 from jointscope.graphs.comparison.comparison_result import ComparisonResult, ModelComparison
 from jointscope.graphs.comparison.open_loop import OPEN_LOOP
 from jointscope.tools.report.page.page import Section, figure
-from jointscope.tools.report.page.plot import Axes, Curve, Mark, plot
+from jointscope.tools.report.page.panels import below_each_other
+from jointscope.tools.report.page.plot import Axes, Curve, Mark
 from jointscope.tools.report.sections.comparison.model_colours import model_colour, model_keys
 
 
@@ -23,16 +24,14 @@ def horizon_curve(result: ComparisonResult) -> Section:
     end = max(result.recording.duration, 1.0)
     sensors = result.models[0].sensors
     panels = []
-    for k, (name, sensor) in enumerate(sensors.items()):
+    for name, sensor in sensors.items():
         marks: list[Mark] = []
         for i, model in enumerate(result.models):
             marks += _curves(model, sensor.channels, end, model_colour(i))
-        last = k == len(sensors) - 1
-        label = f"horizon [s]; at {end:.0f} s: open loop" if last else ""
-        levels = [(1.0, "sensor sigma")]
-        axes = Axes(f"{name} error [sigma]", label, height=180 + 28 * last, log_x=True, log_y=True, levels=levels)
-        panels.append(plot(axes, marks))
-    return Section("horizons", "Error against horizon", figure(panels, model_keys(result)), lead)
+        label, levels = f"horizon [s]; at {end:.0f} s: open loop", [(1.0, "sensor sigma")]
+        axes = Axes(f"{name} error [sigma]", label, height=180, log_x=True, log_y=True, levels=levels)
+        panels.append((axes, marks))
+    return Section("horizons", "Error against horizon", figure(below_each_other(panels), model_keys(result)), lead)
 
 
 def _curves(model: ModelComparison, channels: tuple[str, ...], end: float, colour: str) -> list[Mark]:

@@ -7,7 +7,8 @@ import numpy as np
 
 from jointscope.graphs.comparison.comparison_result import ComparisonResult, SensorPrediction
 from jointscope.tools.report.page.page import Key, Section, figure
-from jointscope.tools.report.page.plot import Axes, Curve, Mark, plot
+from jointscope.tools.report.page.panels import below_each_other
+from jointscope.tools.report.page.plot import Axes, Curve, Mark
 from jointscope.tools.report.page.sparse_series import joined
 from jointscope.tools.report.sections.comparison.model_colours import model_colour, model_keys
 
@@ -46,18 +47,10 @@ def _sensor(result: ComparisonResult, name: str, kind: str, points: int) -> str:
     panels = []
     for i in range(len(first.channels)):
         title, marks = channel_marks(result, name, i, kind, points)
-        last = i == len(first.channels) - 1
         limits = (float(first.times[0]), float(first.times[-1]))
-        axes = Axes(
-            title,
-            "time [s]" if last else "",
-            height=120 + 28 * last,
-            x_range=limits,
-            y_range=_readable(first, i, marks),
-        )
-        panels.append(plot(axes, marks))
+        panels.append((Axes(title, height=120, x_range=limits, y_range=_readable(first, i, marks)), marks))
     keys = [Key("measured", "soft", "wide"), *model_keys(result)]
-    return figure(panels, keys, group="whole")
+    return figure(below_each_other(panels), keys, group="whole")
 
 
 def _readable(sensor: SensorPrediction, i: int, marks: list[Mark]) -> tuple[float, float]:

@@ -11,6 +11,7 @@ from jointscope.graphs.discovery.missing_torque import MissingTorque
 from jointscope.robots.units import joined
 from jointscope.tools.presentation.numbers import significant
 from jointscope.tools.report.page.page import Key, Section, figure, foldable
+from jointscope.tools.report.page.panels import below_each_other
 from jointscope.tools.report.page.plot import Axes, Band, Curve, Mark, plot
 from jointscope.tools.report.sections.diagnosis.torque_maps import NOT_ESTIMATED, candidate_colour, candidate_keys
 
@@ -46,7 +47,7 @@ def torque_over_time(missing: MissingTorque | None) -> Section:
 def _panels(missing: MissingTorque, rows: list[int]) -> list[str]:
     panels = []
     limits = (float(missing.times[0]), float(missing.times[-1]))
-    for k, i in enumerate(rows):
+    for i in rows:
         t, torque, sigma = missing.times, missing.torque[:, i], missing.sigma[:, i]
         rms = significant(float(np.sqrt(np.mean(torque**2))))
         marks: list[Mark] = [
@@ -56,11 +57,10 @@ def _panels(missing: MissingTorque, rows: list[int]) -> list[str]:
         for label, curve in missing.explained_by.items():
             if np.any(curve[:, i]):
                 marks.append(Curve(label, t, curve[:, i], candidate_colour(missing, label), "dashed"))
-        last = k == len(rows) - 1
         unit = missing.unit(missing.rows[i], "N m")
         title = f"{missing.rows[i]} [{unit}], rms {rms} {unit}"
-        panels.append(plot(Axes(title, "time [s]" if last else "", height=150 + 28 * last, x_range=limits), marks))
-    return panels
+        panels.append((Axes(title, height=150, x_range=limits), marks))
+    return below_each_other(panels)
 
 
 def _spectra(missing: MissingTorque, order: list[int]) -> str:

@@ -10,7 +10,8 @@ from jointscope.graphs.fixed_lag.replay.replay_result import ReplayResult
 from jointscope.tools.presentation.numbers import percent
 from jointscope.tools.presentation.sensor_signals import COLOURS
 from jointscope.tools.report.page.page import Key, Section, figure
-from jointscope.tools.report.page.plot import Axes, Band, Curve, Mark, plot
+from jointscope.tools.report.page.panels import below_each_other
+from jointscope.tools.report.page.plot import Axes, Band, Curve, Mark
 
 SMALLEST = 0.1
 
@@ -24,9 +25,8 @@ def nis(result: ReplayResult) -> Section:
     )
     limits = (float(result.states.times[0]), float(result.states.times[-1]))
     panels = []
-    names = list(result.innovations)
-    for k, name in enumerate(names):
-        series, windows = result.innovations[name], NisWindows.of(result.innovations[name])
+    for name, series in result.innovations.items():
+        windows = NisWindows.of(series)
         t = windows.times
         marks: list[Mark] = [Band("99.9 %", t, windows.low, windows.high, "soft")]
         marks += [
@@ -35,18 +35,9 @@ def nis(result: ReplayResult) -> Section:
         ]
         marks.append(Curve("sensor", t, np.maximum(windows.sensor, SMALLEST), "ink"))
         title = f"{name}: NIS per degree of freedom, outside of the bounds in {percent(windows.outside)} of the windows"
-        last = k == len(names) - 1
-        axes = Axes(
-            title,
-            "time [s]" if last else "",
-            height=150 + 28 * last,
-            x_range=limits,
-            y_range=_range(windows),
-            log_y=True,
-        )
-        panels.append(plot(axes, marks))
+        panels.append((Axes(title, height=150, x_range=limits, y_range=_range(windows), log_y=True), marks))
     keys = [Key("sensor", "ink"), *(Key(f"channel {j + 1}", COLOURS[j]) for j in range(3))]
-    body = figure(panels, [*keys, Key("99.9 %", "soft", "band")], group="replay")
+    body = figure(below_each_other(panels), [*keys, Key("99.9 %", "soft", "band")], group="replay")
     return Section("nis", "Consistency over time", body, lead)
 
 

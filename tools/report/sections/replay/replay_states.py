@@ -13,6 +13,7 @@ from jointscope.tools.presentation.numbers import prefixed, with_sigma
 from jointscope.tools.presentation.sensor_signals import COLOURS, liveliest
 from jointscope.tools.presentation.settled import settled_reach
 from jointscope.tools.report.page.page import Key, Section, figure
+from jointscope.tools.report.page.panels import below_each_other, in_band
 from jointscope.tools.report.page.plot import Axes, Band, Curve, Mark, plot
 
 Array = NDArray[np.float64]
@@ -54,18 +55,14 @@ def _closer(result: ReplayResult, layout: StateLayout, limits: Limits) -> list[s
         ("motor velocity", "rad/s", now.mean[:, layout.motor_v], now.sigma[:, layout.motor_v]),
     ]
     panels = []
-    for k, (title, unit, value, sigma) in enumerate(rows):
+    for title, unit, value, sigma in rows:
         seen = (now.times >= limits[0]) & (now.times <= limits[1])
         factor, unit = prefixed(float(np.max(np.abs(value[seen]), initial=0.0)), result.robot.unit(unit))
         marks: list[Mark] = []
         for i, joint in enumerate(result.robot.joints):
-            y, s = factor * value[:, i], 3.0 * factor * sigma[:, i]
-            marks.append(Band("±3 sigma", now.times, y - s, y + s, COLOURS[i % 6]))
-            marks.append(Curve(joint, now.times, y, COLOURS[i % 6]))
-        last = k == len(rows) - 1
-        axes = Axes(f"{title} [{unit}]", "time [s]" if last else "", height=190 + 28 * last, x_range=limits)
-        panels.append(plot(axes, marks))
-    return panels
+            marks += in_band(joint, now.times, factor * value[:, i], factor * sigma[:, i], COLOURS[i % 6])
+        panels.append((Axes(f"{title} [{unit}]", height=190, x_range=limits), marks))
+    return below_each_other(panels)
 
 
 def _corrections(result: ReplayResult, limits: Limits) -> list[str]:
@@ -97,29 +94,21 @@ def _sigmas(result: ReplayResult, layout: StateLayout, limits: Limits) -> list[s
         ("deflection", "rad", result.states.deflection_sigma),
     ]
     panels = []
-    for k, (title, unit, sigma) in enumerate(rows):
+    for title, unit, sigma in rows:
         factor, unit = prefixed(float(np.median(sigma)), result.robot.unit(unit))
         curves = [
             Curve(joint, result.states.times, factor * sigma[:, i], COLOURS[i % 6], points=500)
             for i, joint in enumerate(result.robot.joints)
         ]
-        last = k == len(rows) - 1
-        top = factor * settled_reach(result.states.times, sigma)
-        axes = Axes(
-            f"sigma of {title} [{unit}]",
-            "time [s]" if last else "",
-            height=110 + 28 * last,
-            x_range=limits,
-            y_range=(0.0, top or 1.0),
-        )
-        panels.append(plot(axes, curves))
-    return panels
+        reach = (0.0, factor * settled_reach(result.states.times, sigma) or 1.0)
+        panels.append((Axes(f"sigma of {title} [{unit}]", height=110, x_range=limits, y_range=reach), curves))
+    return below_each_other(panels)
 
 
 def _biases(result: ReplayResult, limits: Limits) -> list[str]:
     """Each axis against its last value, which the title tells."""
     panels, states = [], result.states
-    for k, (gyro, bias) in enumerate(states.biases.items()):
+    for gyro, bias in states.biases.items():
         sigma = states.bias_sigmas[gyro]
         away = bias - bias[-1:]
         settled = np.abs(away[len(away) // 10 :])
@@ -128,25 +117,17 @@ def _biases(result: ReplayResult, limits: Limits) -> list[str]:
         factor, unit = prefixed(reach, own)
         marks: list[Mark] = []
         for i, axis in enumerate("xyz"):
-            y, s = factor * away[:, i], 3.0 * factor * sigma[:, i]
-            marks.append(Band("±3 sigma", states.times, y - s, y + s, COLOURS[i]))
-            marks.append(Curve(axis, states.times, y, COLOURS[i], points=600))
+            marks += in_band(axis, states.times, factor * away[:, i], factor * sigma[:, i], COLOURS[i], 600)
         values = ", ".join(with_sigma(1e3 * b, 1e3 * s)[0] for b, s in zip(bias[-1], sigma[-1], strict=True))
-        last = k == len(states.biases) - 1
         title = f"bias of {gyro} minus its last value [{unit}]; the last is ({values}) 1e-3 {own}"
-        height, limits_y = 150 + 28 * last, (-factor * reach, factor * reach)
-        axes = Axes(title, "time [s]" if last else "", height=height, x_range=limits, y_range=limits_y)
-        panels.append(plot(axes, marks))
-    return panels
+        panels.append((Axes(title, height=150, x_range=limits, y_range=(-factor * reach, factor * reach)), marks))
+    return below_each_other(panels)
 
 
 def _parameters(result: ReplayResult, limits: Limits) -> list[str]:
     panels = []
     for name, rows in result.states.parameters.items():
         unit = result.robot.parameter(name).unit
-        marks: list[Mark] = [
-            Band("±3 sigma", result.states.times, rows[:, 0] - 3 * rows[:, 1], rows[:, 0] + 3 * rows[:, 1], "k2"),
-            Curve(name, result.states.times, rows[:, 0], "k2", points=800),
-        ]
+        marks = in_band(name, result.states.times, rows[:, 0], rows[:, 1], "k2", 800)
         panels.append(plot(Axes(f"{name} [{unit}]", height=180, x_range=limits), marks))
     return panels
