@@ -32,6 +32,12 @@ def share_text(share: float) -> str:
     return percent(share) if abs(share) >= 1e-3 else "0 %"
 
 
+def evidence_texts(c: Candidate) -> list[str]:
+    """Score with its dof, p, the share that is explained, errors on blocks left out and on the held-out recording."""
+    errors = significant(c.validation_error), significant(c.heldout_error)
+    return [significant(c.score), str(c.dof), p_text(c.p_value), share_text(c.share), *errors]
+
+
 def parameter_texts(candidate: Candidate) -> list[Row]:
     """Name, value, sigma and unit of every parameter; a stiffness beside its compliance."""
     rows = [row for name, p in candidate.parameters.items() for row in value_rows(name, p.value, p.sigma, p.unit)]

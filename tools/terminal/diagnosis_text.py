@@ -7,7 +7,7 @@ from collections.abc import Sequence
 
 from jointscope.graphs.discovery.diagnosis_result import Candidate, Diagnosis
 from jointscope.robots.model.command_words import edited_argument, robot_argument
-from jointscope.tools.presentation.candidate_numbers import origin_text, p_text, parameter_texts, share_text
+from jointscope.tools.presentation.candidate_numbers import evidence_texts, origin_text, parameter_texts
 from jointscope.tools.presentation.model_answer import diagnosis_answer, missing_numerics, of_verdict
 from jointscope.tools.presentation.numbers import percent, significant
 from jointscope.tools.terminal.text_table import text_table
@@ -62,12 +62,7 @@ def _row(rank: int, c: Candidate) -> list[str]:
         str(rank),
         c.label,
         f"{c.verdict} (numerics)" if c.numerics else c.verdict,
-        significant(c.score),
-        str(c.dof),
-        p_text(c.p_value),
-        share_text(c.share),
-        significant(c.validation_error),
-        significant(c.heldout_error),
+        *evidence_texts(c),
         ", ".join(c.look_alikes),
     ]
 

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 
 from jointscope.graphs.discovery.diagnosis_result import Candidate, Diagnosis
 from jointscope.graphs.discovery.discovery_result import Discovery
-from jointscope.tools.presentation.candidate_numbers import NOTHING, p_text, parameter_texts, share_text
+from jointscope.tools.presentation.candidate_numbers import NOTHING, evidence_texts, parameter_texts, share_text
 from jointscope.tools.presentation.model_answer import (
     diagnosis_answer,
     discovery_answer,
@@ -79,12 +79,7 @@ def _row(rank: int, c: Candidate) -> list[str]:
         str(rank),
         c.label,
         (f"**{c.verdict}**" if c.verdict in ("missing", "possible") else c.verdict) + _numerics(c),
-        significant(c.score),
-        str(c.dof),
-        p_text(c.p_value),
-        share_text(c.share),
-        significant(c.validation_error),
-        significant(c.heldout_error),
+        *evidence_texts(c),
         ", ".join(sizes) or NOTHING,
     ]
 
