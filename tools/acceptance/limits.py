@@ -14,8 +14,9 @@ number or the quantity names its unit: nothing must pass because it was meant in
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from fnmatch import fnmatchcase
 from numbers import Real
 from pathlib import Path
 from typing import Any
@@ -24,6 +25,7 @@ import numpy as np
 
 from jointscope.robots.errors import RobotError
 from jointscope.robots.files.robot_file import load_robot
+from jointscope.robots.model.robot import Robot
 from jointscope.robots.parts.parameter import Parameter
 from jointscope.robots.unit_text import unit_factor
 from jointscope.robots.yaml_document import read_document
@@ -234,3 +236,28 @@ def _bound(section: Section, key: str, value: Any) -> tuple[float, str]:
 
 
 _READ: Mapping[str, Callable[[Section, str], tuple[float, float, str]]] = {"between": _between, "at_least": _at_least}
+
+
+def check_units(limits: Sequence[Limit], robots: Iterable[Robot]) -> None:
+    """Complains about the first bound that is in no unit of a parameter or channel that it is for.
+
+    Raises:
+        RobotError: a unit does not fit, or a bound has none where the quantity has a dimension.
+    """
+    for robot in robots:
+        for limit in limits:
+            for name, unit in _own_units(limit, robot):
+                if fnmatchcase(name, limit.pattern) and limit.factor_from(unit) is None:
+                    raise RobotError(limit.misfit(unit, name))
+
+
+def _own_units(limit: Limit, robot: Robot) -> Iterator[tuple[str, str]]:
+    """Names and units of all that a limit may be about; nothing where its quantity says its unit."""
+    if limit.in_own_unit:
+        return
+    if limit.subject == "parameter":
+        yield from ((name, parameter.unit) for name, parameter in robot.parameters.items())
+        yield from ((derived.name, derived.unit) for derived in robot.derived)
+    if limit.subject == "channel":
+        for sensor in robot.sensors.values():
+            yield from zip(sensor.channels, sensor.units, strict=True)

@@ -13,8 +13,7 @@ from jointscope.robots.errors import RecordingError, RobotError
 from jointscope.robots.files.robot_file import load_robot
 from jointscope.robots.model.robot import Robot
 from jointscope.robots.recordings.recording import Recording
-from jointscope.tools.acceptance.limits import Limit, read_limits
-from jointscope.tools.acceptance.units import check_units
+from jointscope.tools.acceptance.limits import Limit, check_units, read_limits
 from jointscope.tools.bags.read_recording import read_recording
 from jointscope.tools.presentation.left_out import leave_out as leave_out_texts
 from jointscope.tools.simulator.simulation import Simulation

@@ -7,8 +7,7 @@ from jointscope.tools.closed_loop.closed_loop_result import ClosedLoopResult
 from jointscope.tools.report.page.page import page
 from jointscope.tools.report.page.provenance import provenance
 from jointscope.tools.report.sections.closed_loop.loop_answer import loop_answer
-from jointscope.tools.report.sections.closed_loop.loop_commands import loop_commands
-from jointscope.tools.report.sections.closed_loop.loop_errors import loop_errors, loop_hits
+from jointscope.tools.report.sections.closed_loop.loop_errors import loop_commands, loop_errors, loop_hits
 from jointscope.tools.report.sections.closed_loop.loop_knowledge import loop_knowledge
 from jointscope.tools.report.sections.closed_loop.loop_scores import loop_scores
 from jointscope.tools.report.sections.closed_loop.loop_setup import loop_setup

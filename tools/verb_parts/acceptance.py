@@ -9,8 +9,7 @@ from pathlib import Path
 
 from jointscope.robots.model.robot import Robot
 from jointscope.tools.acceptance.evaluation import AcceptedBy, exit_code
-from jointscope.tools.acceptance.limits import Limit, read_limits
-from jointscope.tools.acceptance.units import check_units
+from jointscope.tools.acceptance.limits import Limit, check_units, read_limits
 
 
 def add_accept_option(parser: argparse.ArgumentParser) -> None:

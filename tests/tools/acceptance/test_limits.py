@@ -10,8 +10,7 @@ import pytest
 from jointscope.robots.errors import RobotError
 from jointscope.robots.files.robot_file import load_robot
 from jointscope.tools.acceptance.evaluation import FAIL, FAILED, OPEN, PASS, UNDECIDED, check_limits, exit_code
-from jointscope.tools.acceptance.limits import read_limits
-from jointscope.tools.acceptance.units import check_units
+from jointscope.tools.acceptance.limits import check_units, read_limits
 
 CONTENT = {
     "converged": True,

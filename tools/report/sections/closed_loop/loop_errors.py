@@ -1,10 +1,11 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Tracking errors over time: distance of the head from its planned place, and the error of every link."""
+"""What runs do: errors of head and links over time, every hit, and the commands around the first of them."""
 
 from __future__ import annotations
 
 import numpy as np
 
+from jointscope.robots.units import si_unit
 from jointscope.tools.closed_loop.closed_loop_result import SOURCES, ClosedLoopResult, LoopRun
 from jointscope.tools.presentation.numbers import minus, prefixed, significant
 from jointscope.tools.report.page.page import Key, Section, figure, table
@@ -88,3 +89,27 @@ def _table(result: ClosedLoopResult, runs: list[LoopRun]) -> str:
         rows.append([f"{hit.time:.2f} s", place, f"{speed[at]:.2f} m/s", *cells])
     head = ["time", "place x, y, z [m]", "speed", *(SOURCES[run.source] for run in runs)]
     return table(head, rows, list(range(1, len(head))))
+
+
+def loop_commands(result: ClosedLoopResult) -> Section:
+    """One figure per controller, one panel per joint."""
+    body = ""
+    for title, runs in by_controller(result):
+        body += f"<h3>{title}</h3>" + figure(_command_panels(result, runs), source_keys(runs), group="commands")
+    lead = "Commands from just before the first hit until the head is home again, as shares of the full command."
+    return Section("commands", "Commands", body, lead)
+
+
+def _command_panels(result: ClosedLoopResult, runs: list[LoopRun]) -> list[str]:
+    plan, hit = result.plan, result.plan.hits[0]
+    rows = slice(plan.tick(hit.start - 0.1), plan.tick(hit.back + 0.2) + 1)
+    panels = []
+    for i, joint in enumerate(result.robot.joints):
+        marks: list[Mark] = [
+            Curve(SOURCES[run.source], plan.times[rows], run.commands[rows, i] / result.full[i], COLOURS[run.source])
+            for run in sorted(runs, key=lambda run: run.tracking.chatter, reverse=True)
+        ]
+        full = f"{result.full[i]:g} {si_unit(result.robot.command.unit)}".replace(" 1", "")
+        title = f"{joint}, share of {full}" if result.robot.command.unit != "duty" else f"{joint}, duty cycle"
+        panels.append((Axes(title, height=120), marks))
+    return below_each_other(panels)
