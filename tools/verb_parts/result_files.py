@@ -100,110 +100,79 @@ def check_viewer(robot: Robot, files: ResultFiles) -> None:
 
 
 def write_calibration(result: Any, files: ResultFiles, checked: AcceptedBy = NO_LIMITS) -> None:
-    """Writes a CalibrationResult, and which limits it keeps.
+    """Writes a CalibrationResult, and which limits it keeps; errors as of `_write`, as of all that follow."""
+    from jointscope.tools.report import calibration_report
+    from jointscope.tools.rerun_log import log_calibration
+    from jointscope.tools.verdicts.judgement import judge
 
-    Raises:
-        JointscopeError: a file cannot be written; then none is.
-    """
-    with ExitStack() as stack:
-        write_robot(stack, files, result.robot, provenance(result))
-        from jointscope.tools.report import calibration_report
-        from jointscope.tools.rerun_log import log_calibration
-        from jointscope.tools.verdicts.judgement import judge
-
-        report, said = partial(calibration_report, checked=checked), acceptance_json(checked)
-        _write_views(stack, result, files, report, log_calibration, lambda: judge(result).to_json() | said)
+    report, said = partial(calibration_report, checked=checked), acceptance_json(checked)
+    _write(result, files, report, log_calibration, lambda: judge(result).to_json() | said, provenance(result))
 
 
 def write_comparison(result: Any, files: ResultFiles, checked: AcceptedBy = NO_LIMITS) -> None:
-    """Writes a ComparisonResult, and which limits its models keep.
+    """Writes a ComparisonResult, and which limits its models keep."""
+    from jointscope.tools.report import comparison_report
+    from jointscope.tools.rerun_log import log_comparison
 
-    Raises:
-        JointscopeError: a file cannot be written; then none is.
-    """
-    with ExitStack() as stack:
-        from jointscope.tools.report import comparison_report
-        from jointscope.tools.rerun_log import log_comparison
-
-        report, said = partial(comparison_report, checked=checked), acceptance_json(checked)
-        _write_views(stack, result, files, report, log_comparison, lambda: said)
+    _write(result, files, partial(comparison_report, checked=checked), log_comparison, lambda: acceptance_json(checked))
 
 
 def write_diagnosis(result: Any, files: ResultFiles, checked: AcceptedBy = NO_LIMITS) -> None:
-    """Writes a Diagnosis, and which limits its model keeps.
+    """Writes a Diagnosis, and which limits its model keeps."""
+    from jointscope.tools.report import diagnosis_report
+    from jointscope.tools.rerun_log import log_diagnosis
 
-    Raises:
-        JointscopeError: a file cannot be written; then none is.
-    """
-    with ExitStack() as stack:
-        from jointscope.tools.report import diagnosis_report
-        from jointscope.tools.rerun_log import log_diagnosis
-
-        report, said = partial(diagnosis_report, checked=checked), acceptance_json(checked)
-        _write_views(stack, result, files, report, log_diagnosis, lambda: said)
+    _write(result, files, partial(diagnosis_report, checked=checked), log_diagnosis, lambda: acceptance_json(checked))
 
 
 def write_discovery(result: Any, files: ResultFiles, start: str) -> None:
-    """Writes a Discovery; its last robot goes to `files.robot`.
+    """Writes a Discovery; its last robot goes to `files.robot`, and `start` is the name of the base robot's file."""
+    from jointscope.tools.report import discovery_report
+    from jointscope.tools.rerun_log import log_discovery
 
-    Args:
-        result: what was found.
-        files: where to.
-        start: name of the base robot's file.
-
-    Raises:
-        JointscopeError: a file cannot be written; then none is.
-    """
-    with ExitStack() as stack:
-        last = len(result.steps) - 1
-        write_robot(stack, files, result.robot, step_provenance(result.steps[last], last, start, result.recordings))
-        from jointscope.tools.report import discovery_report
-        from jointscope.tools.rerun_log import log_discovery
-
-        _write_views(stack, result, files, discovery_report, log_discovery)
+    last = len(result.steps) - 1
+    made = step_provenance(result.steps[last], last, start, result.recordings)
+    _write(result, files, discovery_report, log_discovery, made=made)
 
 
 def write_closed_loop(result: Any, files: ResultFiles) -> None:
-    """Writes a ClosedLoopResult.
+    """Writes a ClosedLoopResult."""
+    from jointscope.tools.report import closed_loop_report
+    from jointscope.tools.rerun_log import log_closed_loop
 
-    Raises:
-        JointscopeError: a file cannot be written; then none is.
-    """
-    with ExitStack() as stack:
-        from jointscope.tools.report import closed_loop_report
-        from jointscope.tools.rerun_log import log_closed_loop
-
-        _write_views(stack, result, files, closed_loop_report, log_closed_loop)
+    _write(result, files, closed_loop_report, log_closed_loop)
 
 
 def write_replay(result: Any, files: ResultFiles) -> None:
-    """Writes a ReplayResult.
+    """Writes a ReplayResult."""
+    from jointscope.tools.report.replay_report import replay_report
+    from jointscope.tools.rerun_log.log_replay import log_replay
+    from jointscope.tools.verdicts.replay_judgement import judge_replay
 
-    Raises:
-        JointscopeError: a file cannot be written; then none is.
-    """
-    with ExitStack() as stack:
-        from jointscope.tools.report.replay_report import replay_report
-        from jointscope.tools.rerun_log.log_replay import log_replay
-        from jointscope.tools.verdicts.replay_judgement import judge_replay
-
-        _write_views(stack, result, files, replay_report, log_replay, lambda: judge_replay(result).to_json())
+    _write(result, files, replay_report, log_replay, lambda: judge_replay(result).to_json())
 
 
-def _write_views(
-    stack: ExitStack,
+def _write(
     result: Any,
     files: ResultFiles,
     report: Callable[[Any], str],
     log: Callable[[Any, Path], None],
     more: Callable[[], dict[str, Any]] = dict,
+    made: dict[str, Any] | None = None,
 ) -> None:
-    """Report, rerun recording and JSON with `more`; they take their places when the stack closes."""
-    write_report(stack, files, partial(report, result))
-    if files.rrd is not None:
-        log(result, stack.enter_context(whole_file(files.rrd)))
-    if files.json is not None:
-        write_json(stack.enter_context(whole_file(files.json)), result.to_json() | more())
+    """Robot file of what was `made`, report, rerun recording, and JSON with `more`: all, or none.
+
+    Raises:
+        JointscopeError: a file cannot be written; then none is.
+    """
+    with ExitStack() as stack:
+        if made is not None:
+            write_robot(stack, files, result.robot, made)
+        write_report(stack, files, partial(report, result))
+        if files.rrd is not None:
+            log(result, stack.enter_context(whole_file(files.rrd)))
+        if files.json is not None:
+            write_json(stack.enter_context(whole_file(files.json)), result.to_json() | more())
 
 
 def write_still(
