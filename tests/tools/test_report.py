@@ -16,7 +16,7 @@ from jointscope.tools.report import calibration_report, comparison_report
 from jointscope.tools.report.page.page import sentence
 from jointscope.tools.report.page.plot import Axes, Band, Bars, Curve, min_max, path, plot
 from jointscope.tools.report.page.scale import log_ticks, nice_ticks
-from jointscope.tools.report.page.sparse_series import joined
+from jointscope.tools.report.sections.comparison.predictions import joined
 from jointscope.tools.terminal.calibration_text import calibration_text
 from jointscope.tools.verdicts.judgement import judge
 

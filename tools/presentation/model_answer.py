@@ -4,12 +4,12 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 from jointscope.graphs.discovery.diagnosis_result import Candidate, Diagnosis
 from jointscope.graphs.discovery.discovery_result import Discovery, DiscoveryStep
-from jointscope.tools.presentation.effect_cards import is_numerics
+from jointscope.robots.effect_kinds.effect import Card
 from jointscope.tools.presentation.numbers import percent, significant
 
 BELIEVED = 0.9  # share of the excess that effects have to explain together where the model stays inadequate
@@ -143,3 +143,28 @@ def missing_numerics(result: Diagnosis) -> list[Candidate]:
 def enumerated(names: Sequence[str], word: str = "and") -> str:
     """A, B and C."""
     return f" {word} ".join(filter(None, [", ".join(names[:-1]), *names[-1:]]))
+
+
+def excitation_of(effect: str) -> str:
+    """Which motion shows an effect."""
+    card = _card(effect)
+    return card.excitation if card else ""
+
+
+def look_alike_reasons(effect: str) -> Mapping[str, str]:
+    """Effects that are hard to tell from this one, with the reason."""
+    card = _card(effect)
+    return card.look_alikes if card else {}
+
+
+def is_numerics(effect: str) -> bool:
+    """Whether it is a defect of the computation."""
+    card = _card(effect)
+    return card is not None and card.numerics
+
+
+def _card(effect: str) -> Card | None:
+    from jointscope.robots.files.effect_catalogue import catalogue  # reads every effect's file: only where it is needed
+
+    known = catalogue().get(effect)
+    return known.card if known else None

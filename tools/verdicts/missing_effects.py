@@ -24,9 +24,8 @@ from jointscope.robots.files.effect_catalogue import catalogue
 from jointscope.robots.model.command_words import edited_argument, robot_argument
 from jointscope.tools.presentation.left_out import recording_arguments
 from jointscope.tools.presentation.numbers import significant
-from jointscope.tools.presentation.one_step import would_be
 from jointscope.tools.verdicts.given_recordings import given
-from jointscope.tools.verdicts.same_time import same_time
+from jointscope.tools.verdicts.same_time import same_time, would_be
 
 MEASURED = "Record the effort that the drives report, measured currents or torques, instead of commands"
 FALLS_WITH = {  # how a gain falls, with what reason, and what helps

@@ -12,10 +12,10 @@ import numpy as np
 from jointscope.graphs.calibration.calibration_result import CalibrationResult
 from jointscope.graphs.scoring.regression.late_drives import LAG
 from jointscope.tools.presentation.numbers import significant
-from jointscope.tools.presentation.one_step import would_be
 from jointscope.tools.verdicts.half_a_sample import NEAR_STEP, how_to_hold, is_half_a_sample
 
 FAR = 0.02  # share of a value by which a delay that is not in the model may change it
+LONG = 0.5  # of a value, beyond which one linear step does not say where it ends
 
 
 def same_time(result: CalibrationResult) -> tuple[str, str]:
@@ -50,3 +50,10 @@ def same_time(result: CalibrationResult) -> tuple[str, str]:
         "bad" if abs(timing.changes[worst.name]) > FAR * abs(worst.value) else "warn",
         f"{what}, with which {would_be(worst.name, worst.value, other, worst.unit)}: {cure}.",
     )
+
+
+def would_be(name: str, value: float, other: float, unit: str) -> str:
+    """A clause on a value and on what a step makes of it."""
+    if abs(other - value) > LONG * abs(value):
+        return f"{name} would change by more than half"
+    return f"{name} would be about {significant(other)} instead of {significant(value)} {unit}"

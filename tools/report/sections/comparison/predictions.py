@@ -4,13 +4,17 @@
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import NDArray
 
 from jointscope.graphs.comparison.comparison_result import ComparisonResult, SensorPrediction
 from jointscope.tools.report.page.page import Key, Section, figure
 from jointscope.tools.report.page.panels import below_each_other
 from jointscope.tools.report.page.plot import Axes, Curve, Mark
-from jointscope.tools.report.page.sparse_series import joined
 from jointscope.tools.report.sections.comparison.model_colours import model_colour, model_keys
+
+Array = NDArray[np.float64]
+
+LONG = 5.0  # [median distance of samples with a value]
 
 
 def predictions(result: ComparisonResult) -> Section:
@@ -62,3 +66,22 @@ def _readable(sensor: SensorPrediction, i: int, marks: list[Mark]) -> tuple[floa
         max(float(values.min()), low - 0.75 * span) - 0.06 * span,
         min(float(values.max()), high + 0.75 * span) + 0.06 * span,
     )
+
+
+def joined(times: Array, values: Array) -> tuple[Array, Array]:
+    """The samples that have a value, interrupted only where one is missing for long.
+
+    Args:
+        times: shape (m,) [s].
+        values: shape (m,); NaN where there is none.
+
+    Returns:
+        Times and values; a NaN stands in every long gap.
+    """
+    good = np.isfinite(values)
+    t, y = times[good], values[good]
+    if len(t) < 3:
+        return t, y
+    gaps = np.diff(t)
+    after = np.flatnonzero(gaps > LONG * np.median(gaps)) + 1
+    return np.insert(t, after, 0.5 * (t[after - 1] + t[after])), np.insert(y, after, np.nan)

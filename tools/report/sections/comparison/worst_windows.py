@@ -9,9 +9,8 @@ from jointscope.graphs.comparison.comparison_result import ComparisonResult, Wor
 from jointscope.tools.presentation.numbers import percent
 from jointscope.tools.report.page.page import Key, Section, figure, table
 from jointscope.tools.report.page.plot import Axes, Curve, Mark, plot
-from jointscope.tools.report.page.sparse_series import joined
 from jointscope.tools.report.sections.comparison.model_colours import model_colour, model_keys
-from jointscope.tools.report.sections.comparison.predictions import channel_marks
+from jointscope.tools.report.sections.comparison.predictions import channel_marks, joined
 
 SHOWN = 4
 AROUND = 0.75  # [s] before and after

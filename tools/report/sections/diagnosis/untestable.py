@@ -6,8 +6,7 @@ from __future__ import annotations
 from html import escape
 
 from jointscope.graphs.discovery.diagnosis_result import Candidate, Diagnosis
-from jointscope.tools.presentation.effect_cards import excitation_of, look_alike_reasons
-from jointscope.tools.presentation.model_answer import of_verdict
+from jointscope.tools.presentation.model_answer import excitation_of, look_alike_reasons, of_verdict
 from jointscope.tools.report.page.page import Section, foldable, sentence, table
 
 SHOWN = 8
