@@ -176,7 +176,7 @@ def test_what_cannot_be_right_is_forgotten():
         history.add(1e-3 * k, np.full(3, 0.5))
     history.add(1e9, np.ones(3))
     history.forget_after(1.0)
-    assert len(history) == 20
+    assert len(history) == 1  # the last one before it
     np.testing.assert_array_equal(history.mean(0.019, 0.020), np.full(3, 0.5))
 
 
