@@ -143,13 +143,16 @@ def _torque_sensor(name: str, section: Section, joints: tuple[str, ...]) -> Torq
     return TorqueSensor(name, source, section.number("sigma", positive=True), joints)
 
 
-def _gyro(name: str, section: Section) -> Gyro:
+def _vectors(section: Section, unit: str, expected: str) -> Topic:
+    """Topic of a sensor with three axes, which are right-handed whatever the driver sends."""
     source = topic(section)
-    if si_unit(source.unit) != "rad/s":
-        raise RobotError(f"{section.place}.unit: a gyroscope measures an angular rate, got {source.unit!r}")
-    left_handed = section.flag("left_handed", False)
-    if left_handed:
-        source = replace(source, scale=RIGHT_FROM_LEFT)
+    if si_unit(source.unit) != unit:
+        raise RobotError(f"{section.place}.unit: {expected}, got {source.unit!r}")
+    return replace(source, scale=RIGHT_FROM_LEFT) if section.flag("left_handed", False) else source
+
+
+def _gyro(name: str, section: Section) -> Gyro:
+    source = _vectors(section, "rad/s", "a gyroscope measures an angular rate")
     form = section.text("form", "full", GYRO_FORMS)
     bias = section.section("bias", {"value": [0.0, 0.0, 0.0]})
     rotation = section.section("R_imu_body")
@@ -168,7 +171,7 @@ def _gyro(name: str, section: Section) -> Gyro:
         reference=section.text("reference") if form == "relative" else None,
         bias_sigma=bias.array("sigma", (3,), None),
         R_sigma=rotation.array("sigma", (3,), None),
-        left_handed=left_handed,
+        left_handed=section.flag("left_handed", False),
     )
     bias.finish()
     rotation.finish()
@@ -176,11 +179,7 @@ def _gyro(name: str, section: Section) -> Gyro:
 
 
 def _accelerometer(name: str, section: Section) -> Accelerometer:
-    source = topic(section)
-    if si_unit(source.unit) != "m/s^2":
-        raise RobotError(f"{section.place}.unit: an accelerometer gives m/s^2 or g, got {source.unit!r}")
-    if section.flag("left_handed", False):
-        source = replace(source, scale=RIGHT_FROM_LEFT)
+    source = _vectors(section, "m/s^2", "an accelerometer gives m/s^2 or g")
     bias = section.section("bias", {"value": [0.0, 0.0, 0.0]})
     found = Accelerometer(
         name=name,
@@ -197,15 +196,11 @@ def _accelerometer(name: str, section: Section) -> Accelerometer:
 
 
 def _position_target(name: str, section: Section) -> PositionTarget:
-    source = topic(section)
-    if si_unit(source.unit) != "m":
-        raise RobotError(f"{section.place}.unit: a position is in m or mm, got {source.unit!r}")
+    source = _vectors(section, "m", "a position is in m or mm")
     if len(source.names) > 1:
         raise RobotError(
             f"{section.place}.names: expected one name, the child_frame_id of this target, got {len(source.names)}"
         )
-    if section.flag("left_handed", False):
-        source = replace(source, scale=RIGHT_FROM_LEFT)
     tracker, pose = section.text("tracker", None), section.array("tracker_pose", (4, 4), None)
     if (tracker is None) == (pose is None):
         raise RobotError(
