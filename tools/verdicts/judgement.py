@@ -21,7 +21,7 @@ from jointscope.tools.verdicts.plausible_torques import plausible_torques
 from jointscope.tools.verdicts.priors.far_from_priors import NAME as AS_EXPECTED_BY_PRIORS
 from jointscope.tools.verdicts.priors.far_from_priors import far_from_priors
 from jointscope.tools.verdicts.priors.held_values import UNDETERMINED, is_mounting_or_bias, values_from_data
-from jointscope.tools.verdicts.rests.rest_verdict import rests_agree
+from jointscope.tools.verdicts.rests.beside_motion import rests_agree
 from jointscope.tools.verdicts.same_time import same_time
 from jointscope.tools.verdicts.same_values import same_by_regression, same_values
 from jointscope.tools.verdicts.short_steps import short_steps

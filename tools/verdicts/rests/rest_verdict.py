@@ -8,11 +8,10 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from jointscope.graphs.calibration.calibration_result import CalibrationResult, ParameterEstimate
+from jointscope.graphs.calibration.calibration_result import ParameterEstimate
 from jointscope.graphs.rests.calibrate_rests import RestCalibration
 from jointscope.graphs.rests.doubts import PLACE, Doubt
 from jointscope.graphs.rests.rest_errors import SURELY
-from jointscope.graphs.rests.rests_beside_motion import seen_rests
 from jointscope.graphs.rests.seen_rests import SeenRests
 from jointscope.graphs.rests.taken_for_granted import all_rigid
 from jointscope.robots.model.command_words import bag_arguments, robot_argument
@@ -31,7 +30,6 @@ BEYOND = 0.1  # of its band, that friction may have to hold beyond it
 SURE = 1e-3  # probability by chance, from which a doubt is none any more
 NEAR = 10.0  # chi2 by which others may fall less and be named as well
 MOST = 3
-NAME, TOLD = "Rests that agree with the model", "Rests that tell what they might"
 
 
 def verdict(result: RestCalibration) -> str:
@@ -170,15 +168,3 @@ def _next(seen: SeenRests, named: list[Doubt]) -> str:
     if all(doubt.label.startswith(PLACE) for doubt in named):
         return "nothing in the catalogue holds that: calibrate from rests near the postures that you need"
     return f"weigh, correct, and calibrate again; {command} ranks what may be missing"
-
-
-def rests_agree(result: CalibrationResult) -> list[tuple[str, str, str]]:
-    """Level, name and sentence of each check; none without rests."""
-    rests = seen_rests(result)
-    if rests is None:
-        return []
-    level, said = contradiction(rests)
-    found = [(level, NAME, f"{said[:1].upper()}{said[1:]}." if said else "Links and motors rest where it says.")]
-    if silent := standing(rests) or from_one_side(rests):
-        found.append(("info", TOLD, f"Of the joints, {silent}."))
-    return found
