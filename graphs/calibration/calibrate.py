@@ -31,8 +31,9 @@ from jointscope.graphs.calibration.friction_at_standstill import (
     sticking_joints,
     with_standstills,
 )
+from jointscope.graphs.calibration.solved_windows import anchored, tested_on_windows
 from jointscope.graphs.calibration.turned_mounting import held, released, turned_without_reason
-from jointscope.graphs.calibration.whole_stage import LOOSE, History, WholeStage, anchored, blunt_sharpness, blunted
+from jointscope.graphs.calibration.whole_stage import LOOSE, History, WholeStage, blunt_sharpness, blunted
 from jointscope.graphs.gtsam_solvers.samples_solver import must_be_short, solve_samples
 from jointscope.graphs.noise.lasting_noise import without_lasting
 from jointscope.graphs.noise.noise_estimation import estimate_noise, not_below
@@ -199,7 +200,7 @@ def _asked_for_causes(
 ) -> CalibrationResult:
     """With what a linear step says of late signals, of masses and, with a stage to try more, of the whole catalogue."""
     test = ScoreTest.of(*solved.of_motions, solved.eliminations)
-    lacking = lacking_effects(test) if stage else ()
+    lacking = lacking_effects(test, tested_on_windows(solved)) if stage else ()
     smoothed = lacking_filter(stage, solved) if stage else None
     if smoothed is not None and smoothed.moved(result.found):
         lacking = (smoothed, *(other for other in lacking if other.effect != smoothed.effect))

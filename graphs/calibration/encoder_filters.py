@@ -17,7 +17,8 @@ from scipy.special import chdtrc
 
 from jointscope.factors.calibration import Calibration
 from jointscope.graphs.calibration.calibration_summary import Solved
-from jointscope.graphs.calibration.whole_stage import WholeStage, anchored
+from jointscope.graphs.calibration.solved_windows import anchored
+from jointscope.graphs.calibration.whole_stage import WholeStage
 from jointscope.graphs.noise.unlikelihood import unlikelihood
 from jointscope.graphs.problem.bag_problem import BagProblem
 from jointscope.graphs.scoring.lacking_effects import LackingEffect

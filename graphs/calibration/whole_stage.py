@@ -17,10 +17,10 @@ from numpy.typing import NDArray
 from jointscope.factors.calibration import Calibration
 from jointscope.graphs.calibration.calibration_result import IterationRecord
 from jointscope.graphs.calibration.calibration_summary import Solved
+from jointscope.graphs.calibration.solved_windows import anchored, noise_windows
 from jointscope.graphs.calibration.stages.convergence_asked import must_converge
-from jointscope.graphs.noise.lasting_noise import NoiseWindows, states_in
 from jointscope.graphs.noise.noise_estimation import FixedPoint, densities, not_below, scaled
-from jointscope.graphs.noise.torque_memory import likeliest_memory, memory_windows
+from jointscope.graphs.noise.torque_memory import likeliest_memory
 from jointscope.graphs.problem.bag_problem import BagProblem
 from jointscope.graphs.solving.batch_solver import Progress, Solution, Solver, first_step, solve
 from jointscope.graphs.solving.convergence import measured_rows
@@ -29,8 +29,6 @@ from jointscope.graphs.solving.set_problem import Problem, SetProblem
 from jointscope.graphs.starts.encoder_motion import hides_reversals
 from jointscope.graphs.starts.initial_guess import initial_states
 from jointscope.graphs.starts.memory_start import with_filled_memories
-from jointscope.graphs.starts.time_shift_start import placed
-from jointscope.robots.effect_kinds.time_shift import TimeShift
 from jointscope.robots.errors import SolveError
 from jointscope.robots.model.robot import Robot
 from jointscope.robots.parts.process_noise import ProcessNoise
@@ -122,7 +120,7 @@ class WholeStage:
         self.progress("memory of random torques", 0.9)
         estimate, motions = white.solution.estimate, len(white.problems)
         try:
-            found = likeliest_memory(_noise_windows(white))
+            found = likeliest_memory(noise_windows(white))
             if found is None:
                 return white
             robot, before = found.robot, white.robot.layout
@@ -197,21 +195,6 @@ class WholeStage:
         return Estimate((*estimate.states, *states), (*estimate.calibrations, *calibrations))
 
 
-def _noise_windows(solved: Solved) -> NoiseWindows:
-    """Windows of a solution on which its noise is looked at."""
-    estimate, problems = solved.solution.estimate, solved.problems
-    pieces = memory_windows([p.recording for p in problems])
-    calibrations = [estimate.calibrations[i] for i, _ in pieces]
-
-    def on(robot: Robot) -> list[BagProblem]:
-        return anchored([BagProblem.of(robot, piece) for _, piece in pieces], calibrations)
-
-    robot = replace(solved.robot, noise=problems[0].dynamics.steps.noise)
-    whole = [(problems[i], estimate.states[i]) for i, _ in pieces]
-    states = [states_in(window, *of) for window, of in zip(on(robot), whole, strict=True)]
-    return NoiseWindows(robot, on, states, calibrations)
-
-
 def blunt_sharpness(robot: Robot, recordings: Sequence[Recording]) -> tuple[float, ...]:
     """Friction sharpness of the stages before the robot's own, where encoders do not show how joints turn over."""
     encoder = robot.motor_encoder
@@ -253,15 +236,6 @@ def approach(
     start = with_filled_memories(now, Estimate(tuple(states), tuple(calibrations)), hold)
     found = first_step(now, start, hold)
     return found or solve(now, start, max_iterations=FEW_ITERATIONS, step_tolerance=NEAR, hold=hold).estimate
-
-
-def anchored(problems: Sequence[BagProblem], calibrations: Sequence[Calibration]) -> list[BagProblem]:
-    """The problems with samples placed where present values say, if stamps may be late."""
-    robot = problems[0].robot
-    if not any(isinstance(here.effect, TimeShift) for here in robot.effects):
-        return list(problems)
-    values = dict(zip(calibrations[0].names, calibrations[0].values.tolist(), strict=True))
-    return placed(problems, values)
 
 
 def _with_sigmas(

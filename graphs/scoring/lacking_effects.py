@@ -28,6 +28,7 @@ Array = NDArray[np.float64]
 
 BY_CHANCE = 1e-2  # probability, over all effects that were asked for together, from which one may be chance
 MOST = 20  # effects whose scatter over blocks is looked at
+FEW = 0.1  # share of absent effects that windows leave to all samples
 AS_SURE = 100.0  # times the probability of the surest effect of an owner, up to which another explains as much
 SURE = 2.0  # [sigma of a value] that an effect must move it, and ...
 MOVED = 0.01  # ... the share of the value: what is called right is right within a percent
@@ -78,21 +79,28 @@ class LackingEffect:
         return {n: d / abs(found[n].value) for n, d in told.items() if abs(d) > MOVED * abs(found[n].value)}
 
 
-def lacking_effects(test: ScoreTest) -> tuple[LackingEffect, ...]:
+def lacking_effects(test: ScoreTest, windows: ScoreTest | None = None) -> tuple[LackingEffect, ...]:
     """Effects that a solved calibration asks for, surest first; few, or none.
 
     Args:
         test: of the whole recordings, linearised at their solution with the noise used.
+        windows: of a part of them, which rules out most hypotheses at a part of the price.
     """
     robot = test.robot
     hypotheses = _hypotheses(robot)
     if robot.choices.link_dynamics != "model" or not hypotheses:
         return ()
-    best, tried = best_shapes(test.each(hypotheses)).values(), len(hypotheses)
+    asked = hypotheses if windows is None else _not_ruled_out(windows, hypotheses)
+    best, tried = best_shapes(test.each(asked)).values(), len(hypotheses)
     seen = [s for s in best if s.plausible[0] == s.score and tried * chdtrc(s.dof, s.score) < BY_CHANCE]
     seen = sorted(seen, key=lambda score: -score.score)[:MOST]
     steps = zip(test.steps([score.hypothesis for score in seen]), seen, strict=True)
     return _leaders([_lacking(test, step, tried, s.worth(test.seconds)) for step, s in steps if _is_possible(step)])
+
+
+def _not_ruled_out(test: ScoreTest, hypotheses: Sequence[EffectHypothesis]) -> list[EffectHypothesis]:
+    """Those whose score on a part of the samples is more than what nine of ten absent effects have there."""
+    return [s.hypothesis for s in test.each(hypotheses) if chdtrc(s.dof, s.score) < FEW]
 
 
 def _leaders(found: Sequence[LackingEffect]) -> tuple[LackingEffect, ...]:

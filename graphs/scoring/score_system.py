@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -75,9 +75,10 @@ class Segment:
         pieces = zip(self.linearized, self.stamps, strict=True)
         return [_sensor_part(self, *piece, stamps) if self._reads(piece[0]) else None for piece, stamps in pieces]
 
-    def prepare(self) -> None:
-        """Finds what all hypotheses need, before threads ask for it."""
-        _ = self.middle, self.ends, self.readings
+    @property
+    def preparations(self) -> tuple[Callable[[], object], ...]:
+        """What finds all that hypotheses need, to be called before threads ask for it; each may have a thread."""
+        return lambda: self.middle, lambda: self.ends, lambda: self.readings
 
     def _reads(self, factor: Factor) -> bool:
         """Whether rows are channels of a sensor; of combinations of them, errors of channels are not known."""

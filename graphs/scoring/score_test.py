@@ -10,6 +10,7 @@ by the sum of squared scores of half-second blocks, which survives coloured ones
 
 from __future__ import annotations
 
+from collections import deque
 from collections.abc import Callable, Sequence
 
 import numpy as np
@@ -86,8 +87,8 @@ class ScoreTest:
         """Scores one by one, in batches."""
         found: list[HypothesisScore] = []
         batches = _batches(hypotheses)
-        for segment in self._segments:
-            segment.prepare()
+        preparations = [prepare for segment in self._segments for prepare in segment.preparations]
+        deque(side_by_side(lambda prepare: prepare(), preparations), maxlen=0)
         for batch, (S, s, columns, _, _) in zip(batches, side_by_side(self._profiled, batches), strict=True):
             found += [_score(hypothesis, S[c, c], s[c]) for hypothesis, c in zip(batch, columns, strict=True)]
         return found

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from simulated_arm import Arm, assert_right, moved, robot_file
 
+from jointscope.graphs.calibration import solved_windows
 from jointscope.graphs.calibration.calibrate import calibrate
 from jointscope.graphs.scoring.regression.asked_by_regression import Asked
 from jointscope.robots.files.effect_editing import add_effect
@@ -74,6 +75,20 @@ def test_cables_that_pull_are_asked_for_and_make_the_values_right(robot):
     mended = calibrated(robot, streams)
     assert check(mended).level == "good"
     assert_right(ARM, mended.parameters, 0.02)
+
+
+def test_windows_of_a_long_recording_lose_no_cause(robot, monkeypatch):
+    streams = moved(ARM, seconds=30.0, encoder_rate=250.0, cable=0.3)
+    windows = []
+    cut = solved_windows.windows_of
+    monkeypatch.setattr(solved_windows, "windows_of", lambda *of: windows.append(cut(*of)) or windows[-1])
+    by_windows = calibrated(robot, streams).lacking
+    assert len(windows) == 1 and 3 <= len(windows[0]) <= 6
+    monkeypatch.setattr(solved_windows, "LONG", np.inf)
+    of_all = calibrated(robot, streams).lacking
+    assert len(windows) == 1
+    assert "parallel_spring" in {e.effect for e in by_windows}
+    assert [(e.label, e.p_value, e.with_it) for e in by_windows] == [(e.label, e.p_value, e.with_it) for e in of_all]
 
 
 def test_commands_that_a_driver_cut_are_asked_for_and_make_the_values_right(robot):

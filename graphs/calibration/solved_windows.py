@@ -1,0 +1,89 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Windows of solved recordings: what part of the samples can tell need not be asked of all of them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from jointscope.factors.calibration import Calibration
+from jointscope.graphs.calibration.calibration_summary import Solved
+from jointscope.graphs.noise.lasting_noise import NoiseWindows, states_in
+from jointscope.graphs.noise.torque_memory import memory_windows
+from jointscope.graphs.problem.bag_problem import BagProblem
+from jointscope.graphs.problem.windows import windows_of
+from jointscope.graphs.scoring.score_test import ScoreTest
+from jointscope.graphs.starts.time_shift_start import placed
+from jointscope.robots.effect_kinds.time_shift import TimeShift
+from jointscope.robots.errors import SolveError
+from jointscope.robots.model.robot import Robot
+from jointscope.robots.recordings.recording import Recording
+
+Array = NDArray[np.float64]
+
+LONG = 25.0  # [s] of recordings, from which some windows are asked before all samples are
+SHARE = 1.0 / 3.0  # of the recordings in those windows
+LENGTH = 2.4  # [s] of one
+
+
+@dataclass(frozen=True)
+class SolvedWindows:
+    """Windows of a solution.
+
+    Attributes:
+        robot: with the noise of the solution.
+        pieces: the windows.
+        states: of each window, shape (k, d).
+        calibrations: shared values of each.
+    """
+
+    robot: Robot
+    pieces: list[Recording]
+    states: list[Array]
+    calibrations: list[Calibration]
+
+    @staticmethod
+    def of(solved: Solved, windows: Sequence[tuple[int, Recording]]) -> SolvedWindows:
+        """Cuts windows, given with the index of their recording, out of a solution."""
+        estimate, problems = solved.solution.estimate, solved.problems
+        robot = replace(solved.robot, noise=problems[0].dynamics.steps.noise)
+        pieces, calibrations = [piece for _, piece in windows], [estimate.calibrations[i] for i, _ in windows]
+        cut = SolvedWindows(robot, pieces, [], calibrations)
+        whole = [(problems[i], estimate.states[i]) for i, _ in windows]
+        states = [states_in(window, *of) for window, of in zip(cut.on(robot), whole, strict=True)]
+        return replace(cut, states=states)
+
+    def on(self, robot: Robot) -> list[BagProblem]:
+        """The factors of all windows for a robot."""
+        return anchored([BagProblem.of(robot, piece) for piece in self.pieces], self.calibrations)
+
+
+def noise_windows(solved: Solved) -> NoiseWindows:
+    """Windows of a solution on which its noise is looked at."""
+    cut = SolvedWindows.of(solved, memory_windows([p.recording for p in solved.problems]))
+    return NoiseWindows(cut.robot, cut.on, cut.states, cut.calibrations)
+
+
+def tested_on_windows(solved: Solved) -> ScoreTest | None:
+    """A score test on a part of long recordings, spread evenly; None where all samples are asked at once."""
+    recordings = [p.recording for p in solved.problems]
+    seconds = sum(float(np.ptp(p.timeline.ticks)) for p in solved.problems)
+    if seconds < LONG:
+        return None
+    try:
+        cut = SolvedWindows.of(solved, windows_of(recordings, SHARE * seconds, LENGTH))
+        return ScoreTest.of(cut.on(cut.robot), cut.states, cut.calibrations)
+    except SolveError:
+        return None
+
+
+def anchored(problems: Sequence[BagProblem], calibrations: Sequence[Calibration]) -> list[BagProblem]:
+    """The problems with samples placed where present values say, if stamps may be late."""
+    robot = problems[0].robot
+    if not any(isinstance(here.effect, TimeShift) for here in robot.effects):
+        return list(problems)
+    values = dict(zip(calibrations[0].names, calibrations[0].values.tolist(), strict=True))
+    return placed(problems, values)
