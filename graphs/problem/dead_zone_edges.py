@@ -43,8 +43,9 @@ class DeadZoneEdges:
         for here in robot.effects:
             if isinstance(here.effect, JointTorque) and here.effect.gap:
                 sizes, j = [values[here.parameter(name)] for name in here.effect.gap], robot.joints.index(here.owner)
-                rows.append(S[layout.joint_q[j]] - S[layout.motor_q[j]])
-                edges.append((-sizes[0], sizes[-1]))
+                if any(sizes):
+                    rows.append(S[layout.joint_q[j]] - S[layout.motor_q[j]])
+                    edges.append((-sizes[0], sizes[-1]))
         if not rows or robot.choices.integrator != "simpson":
             return None
         return DeadZoneEdges(np.array(rows).T, np.array(edges).T)
@@ -64,12 +65,14 @@ class DeadZoneEdges:
         reached = np.any((low < self.edges[:, None]) & (self.edges[:, None] < high), axis=0)
         return np.asarray(np.any(reached & (np.abs(end - begin) > SUDDEN), axis=1))
 
-    def times(self, ticks: Array, x: Array) -> Array:
+    def times(self, ticks: Array, x: Array, known: Array) -> Array:
         """Times that divide the steps which meet an edge, shape (k,) [s].
 
         Args:
             ticks: shape (m + 1,) [s].
             x: states, shape (m + 1, d).
+            known: ticks that divide steps already, shape (j,) [s].
         """
-        hit = self.met(x[:-1], x[1:])
+        short = np.isin(ticks[:-1], known) | np.isin(ticks[1:], known)
+        hit = self.met(x[:-1], x[1:]) & ~short
         return (ticks[:-1][hit, None] + np.diff(ticks)[hit, None] * np.arange(1, PARTS) / PARTS).ravel()
