@@ -46,6 +46,8 @@ from jointscope.robots.recordings.recording import Recording, Stream
 
 Array = NDArray[np.float64]
 
+ROUNDS = 2  # of smoothing, the second where the first sees blows that the measurements alone did not show
+
 WINDOW = 0.25  # [s] length of the windows among which the worst are sought
 WORST = 8
 
@@ -162,9 +164,12 @@ def smooth(robot: Robot, recording: Recording) -> tuple[BagProblem, Array, Calib
     known, start = with_known_values(problem, Calibration.of(robot))
     hold = (DYNAMICS, *(rotation_block(gyro.name) for gyro in robot.gyros))
     first = approach([known], robot.noise, [initial_biases(known, start)], hold)
-    estimate = solve([known], first, hold=hold).estimate
-    short, x = known.divided(estimate.states[0], {})
-    if short is not known:
+    estimate, short = first, known
+    for i in range(ROUNDS):
+        divided, x = short.divided(estimate.states[0], {})
+        if i and divided is short:
+            break
+        short = divided
         estimate = solve([short], Estimate((x,), estimate.calibrations), hold=hold).estimate
     x = _at_ticks(problem, short.timeline.ticks, estimate.states[0])
     return problem, x, carried(estimate.calibrations[0], Calibration.of(robot))
