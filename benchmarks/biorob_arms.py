@@ -1,16 +1,25 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Twenty simulated BioRob arms, all alike in kind and different in every value: do the sigmas hold what they say?"""
+"""Twenty simulated BioRob arms, all alike in kind and different in every value: do the sigmas hold what they say?
+
+An interrupted run goes on where it stopped, as long as the code is the same.
+"""
 
 from __future__ import annotations
 
+import tempfile
 import time
+from pathlib import Path
+from typing import Any
 
 import numpy as np
+from kept_rows import code_of, keep, known_rows
+from patience import say
 from tables import Section, Table
 
 import jointscope as js
 
 ARMS, SECONDS = 20, 12.0
+KEPT = Path(tempfile.gettempdir()) / "jointscope-biorob-arms.jsonl"
 SPREAD = (0.7, 1.3)  # times the values below
 SPRINGS = ((0.416, -0.134, 0.54), (0.992, -0.135, 0.53), (2.189,), (1.166,))  # at the pulleys, by powers of the angle
 DAMPING, LINK_DAMPING = (0.0104, 0.0108, 0.0078, 0.0019), (0.02, 0.02, 0.008, 0.002)
@@ -20,19 +29,16 @@ FRICTION = ((0.06, 0.12, 0.03), (0.08, 0.15, 0.05), (0.05, 0.1, 0.04), (0.03, 0.
 
 def coverage() -> Section:
     """Share of the true values within two sigmas, over all values of all arms."""
-    rows, z, cpu = [], [], []
+    code, arms = code_of(__file__), []
+    known = known_rows(KEPT, code)
     for seed in range(ARMS):
-        values, effects = drawn_arm(seed)
-        simulated = js.simulate("biorob", seconds=SECONDS, seed=seed, parameters=values, effects=effects)
-        start = time.process_time()
-        result = js.calibrate("biorob", simulated.recording)
-        cpu.append(time.process_time() - start)
-        true = simulated.truth["parameters"]
-        own = {p.name: (p.value - true[p.name]) / p.sigma for p in result.parameters if p.name in true and p.sigma}
-        worst = max(own, key=lambda name: abs(own[name]))
-        z += own.values()
-        within = np.mean(np.abs(list(own.values())) < 2.0)
-        rows.append((str(seed), f"{100 * within:.0f}", f"{worst} {own[worst]:+.1f}", result.judgement.headline))
+        name = f"arm {seed}"
+        say(f"arms: {name}")
+        if name not in known:
+            known[name] = {"name": name, **_calibrated(seed)}
+            keep(KEPT, code, known[name])
+        arms.append(known[name])
+    z = [off for arm in arms for off in arm["off"].values()]
     within = 100 * np.mean(np.abs(z) < 2.0)
     summary = Table(
         "Sigmas",
@@ -40,14 +46,34 @@ def coverage() -> Section:
         [
             (f"true values within two sigmas, of {len(z)} [%]", "90 to 98", f"{within:.1f}"),
             ("beyond three sigmas [%]", "", f"{100 * np.mean(np.abs(z) > 3.0):.1f}"),
-            ("one calibration, median [CPU s]", "", f"{np.median(cpu):.0f}"),
+            ("one calibration, median [CPU s]", "", f"{np.median([arm['cpu'] for arm in arms]):.0f}"),
         ],
     )
-    each = Table("Arms", ("arm", "within two sigmas [%]", "worst [sigma]", "verdict"), rows)
+    each = Table("Arms", ("arm", "within two sigmas [%]", "worst [sigma]", "verdict"), [_told(arm) for arm in arms])
     text = (
         f"{SECONDS:g} s of motion each, by MuJoCo with dry friction; every value within 30 % of that of `shared/data`."
     )
     return Section(f"BioRob, {ARMS} arms", text, tables=[summary, each])
+
+
+def _calibrated(seed: int) -> dict[str, Any]:
+    """One arm: errors of its values in sigmas, CPU time, verdict."""
+    values, effects = drawn_arm(seed)
+    simulated = js.simulate("biorob", seconds=SECONDS, seed=seed, parameters=values, effects=effects)
+    start = time.process_time()
+    result = js.calibrate("biorob", simulated.recording)
+    cpu = time.process_time() - start
+    true = simulated.truth["parameters"]
+    off = {p.name: (p.value - true[p.name]) / p.sigma for p in result.parameters if p.name in true and p.sigma}
+    return {"off": off, "cpu": cpu, "verdict": result.judgement.headline}
+
+
+def _told(arm: dict[str, Any]) -> tuple[str, str, str, str]:
+    """A line of the table."""
+    off = arm["off"]
+    worst = max(off, key=lambda name: abs(off[name]))
+    within = np.mean(np.abs(list(off.values())) < 2.0)
+    return arm["name"].split()[1], f"{100 * within:.0f}", f"{worst} {off[worst]:+.1f}", arm["verdict"]
 
 
 def drawn_arm(seed: int) -> tuple[dict[str, float], list[str]]:

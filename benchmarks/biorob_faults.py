@@ -6,7 +6,6 @@ An interrupted run goes on where it stopped, as long as the code is the same.
 
 from __future__ import annotations
 
-import hashlib
 import tempfile
 import time
 from collections.abc import Mapping
@@ -15,12 +14,11 @@ from typing import Any
 
 import numpy as np
 from biorob_arms import drawn_arm
-from kept_rows import keep, known_rows
+from kept_rows import code_of, keep, known_rows
 from patience import say
 from tables import Section, Table
 
 import jointscope as js
-import jointscope.graphs
 from jointscope.graphs.discovery.diagnose import diagnose
 from jointscope.graphs.refits.validation import heldout_error
 from jointscope.robots.files.effect_editing import add_effect
@@ -50,14 +48,15 @@ FAULTS: tuple[tuple[str, tuple[dict[str, float], dict[str, float]]], ...] = (  #
 
 def faults() -> Section:
     """What a diagnosis names first, and what a calibration with it finds, from a model that does not know the fault."""
-    known, rows = known_rows(KEPT, _code()), []
+    code, rows = code_of(__file__), []
+    known = known_rows(KEPT, code)
     for number, (label, sizes) in enumerate(FAULTS):
         for size, values in zip(("small", "large"), sizes, strict=True):
             name = f"{label}, {size}"
             say(f"faults: {name}")
             if name not in known:
                 known[name] = {"name": name, **_tried(label, values, 2 * number + (size == "large"))}
-                keep(KEPT, _code(), known[name])
+                keep(KEPT, code, known[name])
             rows.append(known[name])
     first = [row["first"] == row["name"].split(",")[0] for row in rows]
     within = [abs(z) < 3.0 for row in rows for z in row["off"].values()]
@@ -96,10 +95,3 @@ def _tried(label: str, values: Mapping[str, float], seed: int) -> dict[str, Any]
 
 def _told(off: Mapping[str, float]) -> str:
     return ", ".join(f"{name} {z:+.1f}" for name, z in off.items())
-
-
-def _code() -> str:
-    """Of everything that a row depends on."""
-    root = Path(jointscope.graphs.__file__).resolve().parents[1]
-    files = [f for room in ("robots", "factors", "graphs") for f in sorted((root / room).rglob("*.py"))]
-    return hashlib.sha256(b"".join(f.read_bytes() for f in [*files, Path(__file__)])).hexdigest()[:12]

@@ -3,10 +3,16 @@
 
 from __future__ import annotations
 
+import hashlib
 import json
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
+
+import jointscope.graphs
+
+ROOMS = ("robots", "factors", "graphs", "tools/simulator")  # what simulated recordings and their results depend on
+SUFFIXES = (".py", ".yaml", ".urdf")
 
 
 def keep(path: Path, code: str, row: Mapping[str, Any]) -> None:
@@ -26,3 +32,14 @@ def known_rows(path: Path, code: str) -> dict[str, dict[str, Any]]:
         if content.pop("code") == code:
             found[content["name"]] = content
     return found
+
+
+def code_of(benchmark: str) -> str:
+    """A fingerprint of everything that a row depends on.
+
+    Args:
+        benchmark: `__file__` of the program that measures.
+    """
+    root = Path(jointscope.graphs.__file__).resolve().parents[1]
+    files = [f for room in ROOMS for f in sorted((root / room).rglob("*")) if f.suffix in SUFFIXES]
+    return hashlib.sha256(b"".join(f.read_bytes() for f in [*files, Path(benchmark)])).hexdigest()[:12]

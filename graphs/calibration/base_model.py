@@ -15,6 +15,7 @@ from jointscope.graphs.calibration.calibration_result import CalibrationResult
 from jointscope.graphs.noise.lasting_noise import without_lasting
 from jointscope.graphs.problem.bag_problem import BagProblem, first_command_time
 from jointscope.graphs.problem.standstill import holding_sharpness
+from jointscope.graphs.problem.timeline import Timeline
 from jointscope.graphs.solving.batch_solver import Solver, solve
 from jointscope.robots.model.robot import Robot
 from jointscope.robots.parts.state_layout import StateLayout
@@ -106,7 +107,13 @@ class BaseModel:
 
     def problem(self, bag: int) -> BagProblem:
         """Factors of one recording."""
-        return BagProblem.of(self.robot, self.recordings[bag])
+        return BagProblem.of(self.robot, self.recordings[bag], self.between(bag))
+
+    def between(self, bag: int) -> Array | None:
+        """Ticks of a recording that divide its steps, shape (k,) [s]; None where none does."""
+        whole = Timeline.of(self.result.bags[bag].recording, self.robot.command_held).ticks
+        dividing = np.setdiff1d(self.problem_ticks(bag), whole)
+        return dividing if len(dividing) else None
 
     def states_at(self, bag: int, ticks: Array, layout: StateLayout) -> Array:
         """Smoothed states at other ticks of a recording, in another layout, shape (k, d)."""

@@ -66,7 +66,7 @@ class CalibrationGraph:
             SolveError: a factor for every sample, and recordings of other kinds than motion.
         """
         robot = replace(result.robot, noise=result.noise)  # the file's is that of a filter, with standstills
-        motion = [BagProblem.of(robot, bag.recording) for bag in result.bags]
+        motion = [BagProblem.of(robot, bag.recording, bag.ticks) for bag in result.bags]
         problems: list[Problem] = [*motion, *(other.of_robot(robot) for other, _, _ in result.sets)]
         estimate = Estimate(
             tuple(bag.states for bag in result.bags) + tuple(x for _, x, _ in result.sets),

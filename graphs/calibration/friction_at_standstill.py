@@ -157,7 +157,9 @@ def noise_with_standstills(recordings: Sequence[Recording], solved: Solved, begi
     found, problems = solved.solution.estimate, solved.problems
     pieces = windows_of(recordings)
     calibrations = tuple(found.calibrations[i] for i, _ in pieces)
-    windows = anchored([BagProblem.of(problems[0].robot, piece) for _, piece in pieces], calibrations)
+    windows = anchored(
+        [BagProblem.of(problems[0].robot, piece, problems[i].between) for i, piece in pieces], calibrations
+    )
     windows = [window.with_noise(begin) for window in windows]
     whole = [(problems[i], found.states[i]) for i, _ in pieces]
     states = tuple(states_in(window, *of) for window, of in zip(windows, whole, strict=True))

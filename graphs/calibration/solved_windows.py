@@ -36,12 +36,14 @@ class SolvedWindows:
     Attributes:
         robot: with the noise of the solution.
         pieces: the windows.
+        between: ticks that the whole recording of each has between its samples, as `BagProblem.of` takes them.
         states: of each window, shape (k, d).
         calibrations: shared values of each.
     """
 
     robot: Robot
     pieces: list[Recording]
+    between: list[Array]
     states: list[Array]
     calibrations: list[Calibration]
 
@@ -51,14 +53,16 @@ class SolvedWindows:
         estimate, problems = solved.solution.estimate, solved.problems
         robot = replace(solved.robot, noise=problems[0].dynamics.steps.noise)
         pieces, calibrations = [piece for _, piece in windows], [estimate.calibrations[i] for i, _ in windows]
-        cut = SolvedWindows(robot, pieces, [], calibrations)
+        between = [problems[i].between for i, _ in windows]
+        cut = SolvedWindows(robot, pieces, between, [], calibrations)
         whole = [(problems[i], estimate.states[i]) for i, _ in windows]
         states = [states_in(window, *of) for window, of in zip(cut.on(robot), whole, strict=True)]
         return replace(cut, states=states)
 
     def on(self, robot: Robot) -> list[BagProblem]:
         """The factors of all windows for a robot."""
-        return anchored([BagProblem.of(robot, piece) for piece in self.pieces], self.calibrations)
+        windows = [BagProblem.of(robot, *cut) for cut in zip(self.pieces, self.between, strict=True)]
+        return anchored(windows, self.calibrations)
 
 
 def noise_windows(solved: Solved) -> NoiseWindows:

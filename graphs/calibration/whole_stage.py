@@ -106,7 +106,21 @@ class WholeStage:
 
     def finished(self, problems: Sequence[BagProblem], noise: ProcessNoise, estimate: Estimate) -> Solved:
         """The solution with the noise that the whole asks for, approached from both sides where that is needed."""
-        return self.from_both_sides(self.settled(problems, noise, estimate))
+        return self.with_short_impacts(self.from_both_sides(self.settled(problems, noise, estimate)))
+
+    def with_short_impacts(self, solved: Solved) -> Solved:
+        """The solution with short steps where springs meet edges of dead zones; blows else look like random torque."""
+        problems, states, calibrations = solved.of_motions
+        known = [dict(zip(c.names, c.values.tolist(), strict=True)) for c in calibrations]
+        pairs = [p.divided(x, values) for p, x, values in zip(problems, states, known, strict=True)]
+        now = anchored([p for p, _ in pairs], calibrations)
+        if all(p is whole for (p, _), whole in zip(pairs, problems, strict=True)):
+            return solved
+        start = self.with_sets(Estimate(tuple(x for _, x in pairs), tuple(calibrations)))
+        try:
+            return self.settled(now, problems[0].dynamics.steps.noise, start)
+        except SolveError:
+            return solved
 
     def from_both_sides(self, above: Solved) -> Solved:
         """A solution, or a better one with less noise, where encoders do not show how joints turn over."""

@@ -35,6 +35,7 @@ from jointscope.graphs.problem.bag_problem import BagProblem
 from jointscope.graphs.problem.joint_states import JointStates
 from jointscope.graphs.problem.known_values import carried, with_known_values
 from jointscope.graphs.solving.batch_solver import Progress, solve
+from jointscope.graphs.solving.estimate import Estimate
 from jointscope.graphs.solving.solver_context import in_solver_context
 from jointscope.graphs.starts.drive_signal import with_known_drive_signal
 from jointscope.graphs.starts.initial_guess import initial_biases
@@ -44,6 +45,8 @@ from jointscope.robots.parts.sensors import Sensor
 from jointscope.robots.recordings.recording import Recording, Stream
 
 Array = NDArray[np.float64]
+
+ROUNDS = 2  # of smoothing, the second where the first sees blows that the measurements alone did not show
 
 WINDOW = 0.25  # [s] length of the windows among which the worst are sought
 WORST = 8
@@ -156,13 +159,25 @@ def smooth(robot: Robot, recording: Recording) -> tuple[BagProblem, Array, Calib
     if robot.noise.estimate and not calibrated:
         result = calibrate(robot, [recording], biases_only=True)
         problem = BagProblem.of(replace(robot, noise=result.noise), recording)
-        return problem, result.bags[0].states, result.bags[0].calibration
+        return problem, _at_ticks(problem, result.bags[0].ticks, result.bags[0].states), result.bags[0].calibration
     problem = BagProblem.of(robot, recording)
     known, start = with_known_values(problem, Calibration.of(robot))
     hold = (DYNAMICS, *(rotation_block(gyro.name) for gyro in robot.gyros))
     first = approach([known], robot.noise, [initial_biases(known, start)], hold)
-    estimate = solve([known], first, hold=hold).estimate
-    return problem, estimate.states[0], carried(estimate.calibrations[0], Calibration.of(robot))
+    estimate, short = first, known
+    for i in range(ROUNDS):
+        divided, x = short.divided(estimate.states[0], {})
+        if i and divided is short:
+            break
+        short = divided
+        estimate = solve([short], Estimate((x,), estimate.calibrations), hold=hold).estimate
+    x = _at_ticks(problem, short.timeline.ticks, estimate.states[0])
+    return problem, x, carried(estimate.calibrations[0], Calibration.of(robot))
+
+
+def _at_ticks(problem: BagProblem, ticks: Array, x: Array) -> Array:
+    """States at the ticks of a problem among those at its own and at others, which divide its steps."""
+    return x[np.searchsorted(ticks, problem.timeline.ticks)]
 
 
 def _sensor_prediction(

@@ -3,6 +3,7 @@
 
 The paper's Euler step where the robot file says euler, else Runge-Kutta of order 4 with as many substeps as springs,
 dampers and friction ask for. Motors whose friction would stop them many times over in one step stick and slip instead.
+A step in which a spring meets the edge of its dead zone is cut: its damper comes in and goes out within microseconds.
 Predictions share no code with the collocation that smoothed the states. A model that contradicts the recording may run
 away: its states are then infinite or no numbers, without a word.
 """
@@ -16,6 +17,7 @@ from numpy.typing import NDArray
 
 from jointscope.graphs.comparison.runge_kutta import StepCuts, runge_kutta_from
 from jointscope.graphs.comparison.stick_slip import StickSlip
+from jointscope.graphs.problem.dead_zone_edges import PARTS, DeadZoneEdges
 from jointscope.graphs.problem.standstill import only_stiff_motors
 from jointscope.graphs.problem.timeline import Timeline
 from jointscope.robots.dynamics.command_path import CommandPath
@@ -43,6 +45,7 @@ class Predictor:
         self._h, u = timeline.h, path.acting(robot.values)[0]
         self._torque = self._model.torque_of(u)
         self._cuts = StepCuts(robot, h)
+        self._edges = DeadZoneEdges.of(robot)
 
     def advance(self, x: Array, step: NDArray[np.intp]) -> Array:
         """States one tick later, shape (s, d).
@@ -53,9 +56,18 @@ class Predictor:
         """
         h, torque = self._h[step][:, None], self._torque[step]
         with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
-            if self._dry is not None:
-                return self._dry.advance(x, torque, h)
-            return self._rounded(x, h, torque)
+            after = self._whole(x, h, torque)
+            if self._edges is None or not np.any(met := self._edges.met(x, after)):
+                return after
+            part, acting = x[met], torque[met]
+            for _ in range(PARTS):
+                part = self._whole(part, h[met] / PARTS, acting)
+            after[met] = part
+            return after
+
+    def _whole(self, x: Array, h: Array, torque: Array) -> Array:
+        """States after steps of length h, shape (s, 1), in which nothing happens all of a sudden but friction."""
+        return self._rounded(x, h, torque) if self._dry is None else self._dry.advance(x, torque, h)
 
     def _rounded(self, x: Array, h: Array, torque: Array) -> Array:
         """The same with friction rounded off, as its law says."""

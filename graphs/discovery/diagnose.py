@@ -225,7 +225,7 @@ def _missing_torque(base: BaseModel, refits: Mapping[str, Robot]) -> MissingTorq
         whole = bool(np.all(kept))
         states = base.states[0] if whole else None
         calibration = base.calibrations[0] if whole else None
-        return estimate_missing_torque(base.robot, part, states, calibration, explained_by=refits)
+        return estimate_missing_torque(base.robot, part, states, ticks if whole else None, calibration, refits)
     except JointscopeError:
         return None
 

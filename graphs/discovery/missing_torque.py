@@ -69,6 +69,7 @@ def estimate_missing_torque(
     robot: Robot,
     recording: Recording,
     states: Array | None = None,
+    ticks: Array | None = None,
     calibration: Calibration | None = None,
     explained_by: Mapping[str, Robot] | None = None,
 ) -> MissingTorque:
@@ -81,6 +82,7 @@ def estimate_missing_torque(
         robot: the model.
         recording: the data.
         states: smoothed states of the model, shape (m, d); found here if they are not given.
+        ticks: of these states, where some divide steps, shape (m,) [s].
         calibration: shared values with the biases of the recording; needed with `states`.
         explained_by: refitted models by the label of their effect, for the curves of `explained_by`.
 
@@ -90,9 +92,9 @@ def estimate_missing_torque(
     if states is None or calibration is None:
         problem, states, calibration = smooth(robot, recording)
     else:
-        problem = BagProblem.of(robot, recording)
+        problem = BagProblem.of(robot, recording, ticks)
     free = separate_noise(problem, states, calibration, LASTING).robot
-    x, sigmas = _smoothed(BagProblem.of(free, recording), problem, states, calibration)
+    x, sigmas = _smoothed(problem.of_robot(free), problem, states, calibration)
     return _answer(problem, free, x, sigmas, explained_by or {})
 
 

@@ -128,7 +128,7 @@ def segments_of(base: BaseModel, bag: int) -> list[Segment]:
     found = []
     for t0, t1 in pairwise(edges):
         part = recording if count == 1 else recording.between(float(t0), float(t1))
-        problem = replace(BagProblem.of(base.robot, part), owner=bag)
+        problem = replace(BagProblem.of(base.robot, part, base.between(bag)), owner=bag)
         x = base.states_at(bag, problem.timeline.ticks, base.layout)
         found.append(Segment.of(problem, x, base.calibrations[bag]))
     return found

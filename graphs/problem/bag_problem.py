@@ -20,10 +20,12 @@ from jointscope.factors.dynamics import DynamicsFactor
 from jointscope.factors.euler_dynamics import EulerDynamics
 from jointscope.factors.factor import Factor
 from jointscope.factors.initial_state import InitialStateFactor
+from jointscope.factors.interpolated import interpolate
 from jointscope.factors.midpoint_dynamics import MidpointDynamics
 from jointscope.factors.priors import BiasPrior
 from jointscope.factors.simpson_dynamics import SimpsonDynamics
 from jointscope.factors.step import Steps
+from jointscope.graphs.problem.dead_zone_edges import DeadZoneEdges
 from jointscope.graphs.problem.sensor_placement import Placed, place_sensor
 from jointscope.graphs.problem.standstill import Stretches, holding_motors, stiffness
 from jointscope.graphs.problem.timeline import Timeline
@@ -62,6 +64,7 @@ class BagProblem:
         placed: sensors, initial state, priors that belong to this bag.
         rests: whether the recording starts at rest.
         owner: number of the recording that this is a piece of; pieces share its biases. None for a whole recording.
+        between: times at which steps were divided [s]; None where none was.
     """
 
     robot: Robot
@@ -71,6 +74,7 @@ class BagProblem:
     placed: tuple[Placed, ...]
     rests: bool
     owner: int | None = None
+    between: Array | None = None
 
     @staticmethod
     def of(robot: Robot, recording: Recording, between: Array | None = None) -> BagProblem:
@@ -109,7 +113,7 @@ class BagProblem:
                 values = resting.values[recording.are_judged(resting.times)]
                 if len(values):
                     placed.append(_without_states(BiasAtRestFactor(gyro, values), len(values)))
-        return BagProblem(robot, recording, timeline, dynamics, tuple(placed), rests)
+        return BagProblem(robot, recording, timeline, dynamics, tuple(placed), rests, between=between)
 
     def with_noise(self, noise: ProcessNoise) -> BagProblem:
         """The same problem with another process noise."""
@@ -120,11 +124,29 @@ class BagProblem:
 
     def of_robot(self, robot: Robot) -> BagProblem:
         """The same recording, the same piece, of a robot with other choices, constants or sensors."""
-        return replace(BagProblem.of(robot, self.recording), owner=self.owner)
+        return replace(BagProblem.of(robot, self.recording, self.between), owner=self.owner)
+
+    def divided(self, x: Array, values: Mapping[str, float]) -> tuple[BagProblem, Array]:
+        """The same with its steps divided where springs meet edges of dead zones, and its states; as it is if none do.
+
+        Args:
+            x: states at its ticks, shape (m + 1, d).
+            values: parameters by full name, those that are not free may be missing.
+        """
+        edges, ticks = DeadZoneEdges.of(self.robot.with_values(values)), self.timeline.ticks
+        known = np.zeros(0) if self.between is None else self.between
+        between = known if edges is None else np.union1d(known, edges.times(ticks, x, known))
+        if len(between) == len(known):
+            return self, x
+        divided = replace(BagProblem.of(self.robot, self.recording, between), owner=self.owner)
+        step, fraction = self.timeline.locate(divided.timeline.ticks)
+        states = interpolate(self.robot.layout, x[step], x[step + 1], fraction, self.timeline.h[step])
+        return divided.with_noise(self.dynamics.steps.noise), states
 
     def of_recording(self, recording: Recording) -> BagProblem:
         """The same piece of the same recording, of which something else is left out."""
-        return replace(BagProblem.of(self.robot, recording), owner=self.owner).with_noise(self.dynamics.steps.noise)
+        same = BagProblem.of(self.robot, recording, self.between)
+        return replace(same, owner=self.owner).with_noise(self.dynamics.steps.noise)
 
     def motor_stands(self, ticks: NDArray[np.intp]) -> NDArray[np.bool_]:
         """Whether a motor stands whose friction is stiff (see `holding_motors`), at each of these ticks, shape (s,)."""

@@ -49,7 +49,7 @@ class Timeline:
         Args:
             recording: with its drive signal.
             held: whether each value of it acts until the next one; otherwise it runs smoothly through its samples.
-            between: times at which steps are divided further [s].
+            between: times at which steps are divided further [s]; those outside do nothing.
 
         Raises:
             RecordingError: commands and sensors do not overlap in time.
@@ -77,7 +77,7 @@ class Timeline:
         fraction = np.concatenate([np.arange(p) / p for p in parts])
         ticks = np.append(np.repeat(edges[:-1], parts) + fraction * np.repeat(np.diff(edges), parts), edges[-1])
         if between is not None:
-            ticks = np.union1d(ticks, between)
+            ticks = np.union1d(ticks, between[(between > ticks[0]) & (between < ticks[-1])])
         # a tick that divides a step may be a rounding error away from its beginning, never beyond its end
         step = np.clip(np.searchsorted(edges, ticks[:-1] + 0.5 * np.diff(ticks)) - 1, 0, len(u) - 1)
         return Timeline(ticks, u[step] if held else _means(command, ticks))

@@ -86,12 +86,12 @@ def refit(base: BaseModel, spans: Sequence[Span], score: HypothesisScore | None,
         # the states still are those of a model without the effect: they follow before all parameters move
         estimate = _followed(problems, estimate)
     solution = solve(problems, estimate, max_iterations=FIRST_ITERATIONS, step_tolerance=ENOUGH)
-    estimate = solution.estimate
+    problems, estimate = _with_short_impacts(problems, solution.estimate)
     if noise.estimate:
         noise, estimate = estimate_noise(problems, estimate, cycles=NOISE_CYCLES)
     if any(isinstance(here.effect, TimeShift) for here in robot.effects):
         moved = _with(robot, estimate.calibrations[0])
-        problems = [replace(BagProblem.of(moved, p.recording), owner=p.owner) for p in problems]
+        problems = [p.of_robot(moved) for p in problems]
     problems = [problem.with_noise(noise) for problem in problems]
     solution = solve(problems, estimate, max_iterations=LAST_ITERATIONS, step_tolerance=ENOUGH)
     found = solution.estimate.calibrations[0]
@@ -114,6 +114,13 @@ def _followed(problems: Sequence[BagProblem], start: Estimate) -> Estimate:
     found = solve([problem for problem, _ in pairs], known, max_iterations=FOLLOWING, hold=(DYNAMICS,)).estimate
     back = [carried(*pair) for pair in zip(found.calibrations, start.calibrations, strict=True)]
     return Estimate(found.states, tuple(back))
+
+
+def _with_short_impacts(problems: Sequence[BagProblem], estimate: Estimate) -> tuple[list[BagProblem], Estimate]:
+    """With short steps where springs meet edges of dead zones, as a calibration has them."""
+    values = dict(zip(estimate.calibrations[0].names, estimate.calibrations[0].values.tolist(), strict=True))
+    pairs = [p.divided(x, values) for p, x in zip(problems, estimate.states, strict=True)]
+    return [p for p, _ in pairs], Estimate(tuple(x for _, x in pairs), estimate.calibrations)
 
 
 def start_of(score: HypothesisScore, robot: Robot) -> dict[str, float]:
@@ -150,7 +157,7 @@ def _pieces(base: BaseModel, robot: Robot, spans: Sequence[Span]) -> tuple[list[
     problems, states, calibrations = [], [], []
     for span in spans:
         piece: Recording = base.recordings[span.bag].between(span.t0, span.t1)
-        problem = replace(BagProblem.of(robot, piece), owner=span.bag)
+        problem = replace(BagProblem.of(robot, piece, base.between(span.bag)), owner=span.bag)
         problems.append(problem)
         states.append(base.states_at(span.bag, problem.timeline.ticks, robot.layout))
         calibrations.append(Calibration.of(robot).with_points(base.calibrations[span.bag].own))

@@ -16,6 +16,7 @@ from jointscope.graphs.comparison.prediction import Predictor
 from jointscope.graphs.comparison.runge_kutta import StepCuts, runge_kutta
 from jointscope.graphs.problem.timeline import Timeline
 from jointscope.robots.dynamics.elastic_joints import ElasticJoints
+from jointscope.robots.files.effect_editing import add_effect
 from jointscope.robots.files.robot_file import load_robot
 from jointscope.tools.bags.read_recording import read_recording
 from jointscope.tools.terminal.comparison_text import comparison_text
@@ -169,3 +170,21 @@ def test_an_open_loop_that_runs_away_is_said_to_be_infinite():
     assert result.models[0].channels["shoulder.motor_position"].horizons["open_loop"] == np.inf
     row = next(line for line in comparison_text(result).splitlines() if line.startswith("  shoulder.motor_position"))
     assert "∞" in row
+
+
+@pytest.mark.parametrize("label", ["backlash@joint1", "spring_slack@joint1"])
+def test_a_link_that_falls_through_its_dead_zone_hits_the_edge_as_by_small_steps(label):
+    sizes = {"half_gap": 0.1} if label.startswith("backlash") else {"forward": 0.1, "backward": 0.05}
+    robot = load_robot("biorob")
+    smooth = {name: 0.0 for name in robot.parameters if "coulomb" in name or "weight_dependent" in name}
+    robot = add_effect(robot.with_values(smooth), label, sizes)
+    x = np.zeros((1, robot.layout.size))
+    x[:, robot.layout.q_link] = q = np.array([0.0, -np.pi / 2, 0.0, 0.0])
+    x[:, robot.layout.q_motor] = np.linalg.solve(robot.transmission, q)
+    x[:, robot.layout.joint_v[0]] = 2.0
+    timeline = Timeline(2e-3 * np.arange(61), np.zeros((60, robot.n)))
+    reference, predictor = in_small_steps(robot, timeline, x), Predictor(robot, timeline)
+    error = np.abs(predictor.path(x[0]) - reference)[:, robot.layout.positions].max()
+    predictor._edges = None
+    without = np.abs(predictor.path(x[0]) - reference)[:, robot.layout.positions].max()
+    assert error < 1e-6 < without

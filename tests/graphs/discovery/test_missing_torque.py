@@ -41,7 +41,7 @@ def hidden(request, doggy):
     right = add_effect(robot, label)
     known = simulation.truth["parameters"]
     right = right.with_values({name: known[name] for name in right.parameters if name in known})
-    found = estimate_missing_torque(robot, simulation.recording, bag.states, bag.calibration, {label: right})
+    found = estimate_missing_torque(robot, simulation.recording, bag.states, None, bag.calibration, {label: right})
     return found, found.explained_by[label], found.times > found.times[0] + SETTLED
 
 
@@ -68,7 +68,7 @@ def test_nothing_is_missing_from_a_clean_recording(doggy):
 
     simulation = simulate(doggy, "moves", 3.0, seed=8, friction="smooth")
     robot, bag = truth_of(doggy, simulation)
-    found = estimate_missing_torque(robot, simulation.recording, bag.states, bag.calibration)
+    found = estimate_missing_torque(robot, simulation.recording, bag.states, None, bag.calibration)
     late = found.times > found.times[0] + SETTLED
     assert np.all(np.abs(found.torque[late]) < 3.0 * found.sigma[late])
     assert np.max(found.sigma[late]) < 0.05

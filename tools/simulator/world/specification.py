@@ -26,7 +26,7 @@ from jointscope.tools.simulator.world.mujoco_module import load_mujoco
 Array = NDArray[np.float64]
 Shares = Mapping[str, Mapping[str, float]]  # of links in the deflection of each joint's spring
 
-DRY_TIME_CONSTANT = 1e-3  # [s] of the engine's soft stiction; the shortest that is smooth at 5 kHz
+DRY_TIME_CONSTANT = 4e-4  # [s] of the engine's soft stiction, which turns round half of it early; two steps at 5 kHz
 STIFF = (4e-4, 1.0)  # [s] time constant and damping ratio with which a mimic joint is pulled back; two steps at 5 kHz
 CURVES = ("spring_cubic", "spring_curve")  # effects that bend a spring
 DRY_IMPEDANCE = (0.9999, 0.9999, 0.001, 0.5, 2.0)  # almost rigid
