@@ -112,13 +112,11 @@ class SpringTrials:
         far = self._far(missing)
         if missing and not far and not any(c.verdict == "missing" for c in candidates):
             far = self._far({})
-        springs = [c for c in candidates if c.effect == SPRING]
-        starts = {c.owner: {name: p.value for name, p in c.parameters.items()} for c in springs}
-        tried = {f"{SPRING}@{joint}": self._fitted(joint, starts.get(joint)) for joint in far}
+        told = {c.label: c for c in candidates if c.effect == SPRING}
+        tried = {label: self._fitted(label, told.get(label)) for label in (f"{SPRING}@{joint}" for joint in far)}
         if not tried:
             return list(candidates), {}
         seconds = judged_seconds(self.base, self.spans[1])
-        told = {c.label: c for c in springs}
         springs = [
             _small_and_sure(judge(c, self.before, tried[c.label], seconds, tried[c.label] is None), told, self.before)
             for c in scored.candidates
@@ -161,9 +159,9 @@ class SpringTrials:
         refit = Refit(elastic.robot, spring.label, elastic.calibrations, sigmas, converged=True)
         return ValidatedRefit(refit, errors, reported_heldout_error(elastic.robot, self.holdout))
 
-    def _elastic(self, label: str, start: Mapping[str, float] | None = None) -> BaseModel:
+    def _elastic(self, label: str, start: Mapping[str, float]) -> BaseModel:
         """The model with a spring, calibrated for the measure by which the one without was judged."""
-        grown = add_effect(self._start, label, dict(start or {}))
+        grown = add_effect(self._start, label, dict(start))
         return BaseModel.of(grown, self.base.recordings, by_torques=self.base.by_torques)
 
     @cached_property
@@ -182,16 +180,17 @@ class SpringTrials:
                 found |= {here.parameter(name): value for name, value in start.items()}
         return robot.with_values(found)
 
-    def _fitted(self, joint: str, start: Mapping[str, float] | None) -> ValidatedRefit | None:
+    def _fitted(self, label: str, told: Candidate | None) -> ValidatedRefit | None:
         """The best of models with a spring of several stiffnesses at the start; None where none can be calibrated.
 
-        Its own start is what missing torque tells of it, if that is something; far from a stiff spring there are other
-        minima. Stiffer ones are tried until one is clear, or no better than the one before.
+        They begin with what missing torque tells of it, if that is something; far from a stiff spring there are other
+        minima. Where it says that the spring is there, stiffer ones are tried until one is clear, or no better.
         """
+        start = {name: p.value for name, p in told.parameters.items()} if told is not None else {}
+        there = told is not None and told.verdict != "absent" and "compliance" in start
         best: ValidatedRefit | None = None
-        for factor in STIFFER if start else (1.0,):
-            own = {**start, "compliance": start["compliance"] / factor} if start else None
-            fitted = self._fitted_from(joint, own)
+        for factor in STIFFER if there else STIFFER[:1]:
+            fitted = self._fitted_from(label, start | {"compliance": start["compliance"] / factor} if there else start)
             if fitted is None:
                 continue
             if best is not None and not fitted.validation.error < best.validation.error:
@@ -201,12 +200,11 @@ class SpringTrials:
                 break
         return best
 
-    def _fitted_from(self, joint: str, start: Mapping[str, float] | None) -> ValidatedRefit | None:
+    def _fitted_from(self, label: str, start: Mapping[str, float]) -> ValidatedRefit | None:
         """The model with a spring; None where it cannot be calibrated.
 
         It is calibrated from the start values: the rotor of the rigid model moves the link, too.
         """
-        label = f"{SPRING}@{joint}"
         try:
             elastic = self._elastic(label, start)
             return refit_and_validate(elastic, self.spans, label=label, holdout=self.holdout)

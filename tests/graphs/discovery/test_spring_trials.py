@@ -49,7 +49,7 @@ def trials(monkeypatch, spring, rival=float("inf"), missing=50.0, verdict="missi
     monkeypatch.setattr(spring_trials, "catalogue", lambda: {spring_trials.SPRING: Owners()})
     monkeypatch.setattr(spring_trials, "judge", lambda *_: spring)
     fitted = SimpleNamespace(refit=SimpleNamespace(robot="elastic"))
-    monkeypatch.setattr(SpringTrials, "_fitted", lambda self, joint, start: fitted)
+    monkeypatch.setattr(SpringTrials, "_fitted", lambda self, label, told: fitted)
     monkeypatch.setattr(SpringTrials, "_rival", lambda *_: rival)
     before = ValidationError(100.0, 10.0, np.array([100.0]), {"j1.p": 100.0, "j2.p": 1.0})
     tried = SpringTrials(SimpleNamespace(robot=robot), ((), ()), before, None)
@@ -104,26 +104,29 @@ def fitted(error, compliance=4e-4):
 
 
 @pytest.mark.parametrize(
-    ("errors", "best", "tried"),
+    ("errors", "best", "tried", "verdict"),
     [
-        pytest.param((10.0,), 10.0, 1, id="a clear one is the last"),
-        pytest.param((90.0, 80.0, 85.0), 80.0, 3, id="a stiffer one is better"),
-        pytest.param((90.0, 95.0), 90.0, 2, id="a stiffer one is worse"),
-        pytest.param((None, 80.0, None), 80.0, 3, id="not all can be calibrated"),
-        pytest.param((None, None, None), None, 3, id="none can be"),
+        pytest.param((10.0,), 10.0, 1, "possible", id="a clear one is the last"),
+        pytest.param((90.0, 80.0, 85.0), 80.0, 3, "possible", id="a stiffer one is better"),
+        pytest.param((90.0, 95.0), 90.0, 2, "possible", id="a stiffer one is worse"),
+        pytest.param((None, 80.0, None), 80.0, 3, "possible", id="not all can be calibrated"),
+        pytest.param((None, None, None), None, 3, "possible", id="none can be"),
+        pytest.param((90.0,), 90.0, 1, "absent", id="missing torque does not tell of it"),
     ],
 )
-def test_a_spring_begins_stiffer_until_that_is_no_better(monkeypatch, errors, best, tried):
+def test_a_spring_begins_stiffer_until_that_is_no_better(monkeypatch, errors, best, tried, verdict):
     asked = []
 
-    def fitted_from(self, joint, start):
+    def fitted_from(self, label, start):
         asked.append(start["compliance"])
         error = errors[len(asked) - 1]
         return None if error is None else fitted(error)
 
     monkeypatch.setattr(SpringTrials, "_fitted_from", fitted_from)
     before = ValidationError(100.0, 10.0, np.array([100.0]), {})
-    found = SpringTrials(SimpleNamespace(), ((), ()), before, None)._fitted("j1", {"compliance": 9e-4, "damping": 2.0})
+    sizes = {"compliance": EffectEstimate(9e-4, 1e-4, "rad/(N m)"), "damping": EffectEstimate(2.0, 1.0, "N m s/rad")}
+    told = replace(candidate("joint_elasticity", verdict), parameters=sizes)
+    found = SpringTrials(SimpleNamespace(), ((), ()), before, None)._fitted(told.label, told)
     assert (None if found is None else found.validation.error) == best
     assert asked == pytest.approx([9e-4, 3e-4, 1e-4][:tried])
 
