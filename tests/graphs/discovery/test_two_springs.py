@@ -53,7 +53,7 @@ def test_both_springs_are_found_and_none_stands_for_the_other(tmp_path):
     (tmp_path / "elastic.yaml").write_text(ROBOT.replace("MODEL\n", "").replace("SPRINGS", SPRINGS), encoding="utf-8")
     (tmp_path / "rigid.yaml").write_text(ROBOT.replace("MODEL", RIGID).replace("SPRINGS\n", ""), encoding="utf-8")
     robot = load_robot(tmp_path / "elastic.yaml")
-    recording = simulate(robot, "calibration", 10.0, seed=3, friction="smooth").recording
+    recording = simulate(robot, "calibration", 6.0, seed=3, friction="smooth").recording
     found = discover(load_robot(tmp_path / "rigid.yaml"), [recording], missing_torque=False)
     assert {step.added for step in found.steps[1:3]} == {"joint_elasticity@shoulder", "joint_elasticity@elbow"}
     for joint, stiffness in STIFFNESS.items():
