@@ -161,20 +161,23 @@ def turns_over_sharper(before: Robot, after: Robot) -> str:
     )
 
 
-def torque_judge(base: BaseModel) -> TorqueJudge | None:
+def torque_judge(base: BaseModel, with_springs: bool = True) -> TorqueJudge | None:
     """The judge in the highest band in which the encoders are quiet, else in the lowest that has enough rows.
+
+    Args:
+        base: the model.
+        with_springs: whether springs that were added stand in the equations of their motors as the reaction of what
+            swings behind them; without, they are asked for again.
 
     Returns:
         None for a model that is judged by predictions, and for recordings that are too short.
-
-    Springs that were added stand in the equations of their motors as the reaction of what swings behind them.
     """
     if not base.by_torques or base.robot.layout.memories:
         return None
     rigid = _as_motors_move(base)
     if rigid is None:
         return None
-    springs, found = known_springs(base.robot, rigid.robot), None
+    springs, found = known_springs(base.robot, rigid.robot) if with_springs else [], None
     segments = [s for bag in range(len(base.recordings)) for s in segments_of(rigid, bag)]
     for band in BANDS:
         equations = TorqueEquations.of(segments, band, springs)

@@ -12,8 +12,9 @@ import pytest
 
 from jointscope.graphs.discovery import spring_trials
 from jointscope.graphs.discovery.diagnose import diagnose
-from jointscope.graphs.discovery.diagnosis_result import Candidate
+from jointscope.graphs.discovery.diagnosis_result import Candidate, EffectEstimate
 from jointscope.graphs.discovery.spring_trials import SpringTrials, kept_by_predictions
+from jointscope.graphs.judging.torque_judge import SMALL
 from jointscope.graphs.refits.validation import ValidationError
 from jointscope.robots.files.robot_file import load_robot
 from jointscope.tools.bags.read_recording import read_recording
@@ -48,7 +49,7 @@ def trials(monkeypatch, spring, rival=float("inf"), missing=50.0, verdict="missi
     monkeypatch.setattr(spring_trials, "catalogue", lambda: {spring_trials.SPRING: Owners()})
     monkeypatch.setattr(spring_trials, "judge", lambda *_: spring)
     fitted = SimpleNamespace(refit=SimpleNamespace(robot="elastic"))
-    monkeypatch.setattr(SpringTrials, "_fitted", lambda self, joint, start: fitted)
+    monkeypatch.setattr(SpringTrials, "_fitted", lambda self, label, told: fitted)
     monkeypatch.setattr(SpringTrials, "_rival", lambda *_: rival)
     before = ValidationError(100.0, 10.0, np.array([100.0]), {"j1.p": 100.0, "j2.p": 1.0})
     tried = SpringTrials(SimpleNamespace(robot=robot), ((), ()), before, None)
@@ -95,3 +96,54 @@ def test_a_stiff_spring_that_takes_little_torque_is_tried_where_nothing_else_is_
 )
 def test_predictions_keep_springs_that_explain_most_of_their_error_and_nothing_else(effect, after, kept):
     assert kept_by_predictions(candidate(effect, "missing"), 101.0, after) is kept
+
+
+def fitted(error, compliance=4e-4):
+    robot = SimpleNamespace(parameters={"j1.joint_elasticity.compliance": compliance})
+    return SimpleNamespace(validation=SimpleNamespace(error=error), refit=SimpleNamespace(robot=robot))
+
+
+@pytest.mark.parametrize(
+    ("errors", "best", "tried", "verdict"),
+    [
+        pytest.param((10.0,), 10.0, 1, "possible", id="a clear one is the last"),
+        pytest.param((90.0, 80.0, 85.0), 80.0, 3, "possible", id="a stiffer one is better"),
+        pytest.param((90.0, 95.0), 90.0, 2, "possible", id="a stiffer one is worse"),
+        pytest.param((None, 80.0, None), 80.0, 3, "possible", id="not all can be calibrated"),
+        pytest.param((None, None, None), None, 3, "possible", id="none can be"),
+        pytest.param((90.0,), 90.0, 1, "absent", id="missing torque does not tell of it"),
+    ],
+)
+def test_a_spring_begins_stiffer_until_that_is_no_better(monkeypatch, errors, best, tried, verdict):
+    asked = []
+
+    def fitted_from(self, label, start):
+        asked.append(start["compliance"])
+        error = errors[len(asked) - 1]
+        return None if error is None else fitted(error)
+
+    monkeypatch.setattr(SpringTrials, "_fitted_from", fitted_from)
+    before = ValidationError(100.0, 10.0, np.array([100.0]), {})
+    sizes = {"compliance": EffectEstimate(9e-4, 1e-4, "rad/(N m)"), "damping": EffectEstimate(2.0, 1.0, "N m s/rad")}
+    told = replace(candidate("joint_elasticity", verdict), parameters=sizes)
+    found = SpringTrials(SimpleNamespace(), ((), ()), before, None)._fitted(told.label, told)
+    assert (None if found is None else found.validation.error) == best
+    assert asked == pytest.approx([9e-4, 3e-4, 1e-4][:tried])
+
+
+@pytest.mark.parametrize(
+    ("share", "reason", "sigma", "after", "verdict"),
+    [
+        pytest.param(0.8, SMALL, 1e-5, 100.0, "missing", id="most of what its joint lacks"),
+        pytest.param(0.4, SMALL, 1e-5, 100.0, "absent", id="less than that"),
+        pytest.param(0.8, "it helps on 3 of 10", 1e-5, 100.0, "absent", id="refused for another reason"),
+        pytest.param(0.8, SMALL, 3e-4, 100.0, "absent", id="not sure"),
+        pytest.param(0.8, SMALL, 1e-5, 110.0, "absent", id="predictions are worse"),
+    ],
+)
+def test_a_small_spring_is_kept_if_it_is_most_of_the_torque_and_sure(share, reason, sigma, after, verdict):
+    sizes = {"compliance": EffectEstimate(4e-4, sigma, "rad/(N m)")}
+    judged = replace(candidate("joint_elasticity", "absent", after), parameters=sizes, refitted=True)
+    told = {judged.label: replace(judged, verdict="possible", share=share, reasons=(reason,))}
+    before = ValidationError(100.0, 10.0, np.array([100.0]), {})
+    assert spring_trials._small_and_sure(judged, told, before).verdict == verdict
