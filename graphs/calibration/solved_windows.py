@@ -43,7 +43,7 @@ class SolvedWindows:
 
     robot: Robot
     pieces: list[Recording]
-    between: list[Array]
+    between: list[Array | None]
     states: list[Array]
     calibrations: list[Calibration]
 
