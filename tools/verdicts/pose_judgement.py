@@ -9,12 +9,12 @@ import numpy as np
 
 from jointscope.factors.calibration import Calibration
 from jointscope.graphs.poses.calibrate_poses import PoseCalibration
-from jointscope.graphs.poses.elsewhere import sigma_elsewhere
+from jointscope.graphs.poses.determined import sigma_elsewhere
 from jointscope.graphs.poses.linear_poses import LinearPoses
 from jointscope.graphs.poses.pose_set import PoseSet
 from jointscope.graphs.poses.tip_errors import summary
 from jointscope.graphs.poses.untold_distances import untold_distance
-from jointscope.graphs.poses.what_moved import what_moved
+from jointscope.graphs.poses.what_moved import what_moved, with_ends
 from jointscope.robots.geometry.error_parameters import BACKLASH
 from jointscope.tools.presentation.numbers import significant
 from jointscope.tools.verdicts.judgement import Check, Judgement
@@ -98,9 +98,10 @@ def _outliers(result: PoseCalibration) -> Check:
 
 
 def _still(result: PoseCalibration) -> Check:
-    """Whether the tracker stood still, and targets on the tool: no step in what is left, anywhere in a session."""
-    name = "A tracker that stands still, and targets that sit fast"
-    step = what_moved(LinearPoses.of(result), result.problems, result.calibrations)
+    """Whether tracker, targets and zeros of joints stayed: no step in what is left, anywhere in a session."""
+    name = "A tracker that stands still, targets that sit fast and joints that keep their zero"
+    problems = with_ends(result.problems, result.whole)
+    step = what_moved(LinearPoses.at(result.robot, problems, result.calibrations), problems, result.calibrations)
     if step is None:
         return Check("good", name, "The residuals show no step over the session.")
     return Check("bad", name, f"{step.text}.")
