@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Contacts that two different targets were in, though nothing says so: two balls, two tools, one that was mounted anew.
+"""Contacts that do not hold one target at one point: two balls, one that was mounted anew, a plate that moved.
+
+Of two targets before anything is computed:
 
     p_i + A_i s = c,    s = one of two shifts of the target on the tool, c = the point of the contact of pose i
 
@@ -9,7 +11,8 @@ three poses of a contact determine, and improved in turn.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -143,3 +146,47 @@ def _said(problem: PoseSet, which: NDArray[np.intp], shifts: Array, apart: float
         f"mm from each other on the tool, or one was mounted anew: one leaves {1e3 * apart:.2g} mm, two leave "
         f"{1e3 * left:.2g} mm: at [{at[0]}] of {setup.link} in {first}, at [{at[1]}] in {second}; {todo}"
     )
+
+
+@dataclass(frozen=True)
+class MovedContact:
+    """Poses one after the other that were left out and are off alike: first and last, contact, how far [m]."""
+
+    first: str
+    last: str
+    contact: str
+    size: float
+
+
+def moved_contacts(
+    problems: Sequence[PoseSet], whole: Sequence[PoseSet], calibrations: Sequence[Calibration]
+) -> list[MovedContact]:
+    """Where a contact was elsewhere for some poses: they are off in one direction of the base, whatever the posture.
+
+    Args:
+        problems: the sessions without poses that were left out.
+        whole: with them.
+        calibrations: of each.
+    """
+    found = list[MovedContact]()
+    for problem, all_of_it, calibration in zip(problems, whole, calibrations, strict=True):
+        session, held = replace(problem, poses=all_of_it.poses), all_of_it.poses.contacts
+        if not held or session.contacts != problem.contacts:
+            continue
+        off = session.misses(session.point(calibration), calibration)
+        out, i = ~np.isin(session.poses.shares, problem.poses.shares), 0
+        while i < len(off):
+            k = i
+            while k < len(off) and out[k] and held[k] == held[i] and _alike(off[i : k + 1]):
+                k += 1
+            if k - i >= FEWEST:
+                size, names = float(np.linalg.norm(off[i:k].mean(axis=0))), session.poses.names
+                found.append(MovedContact(names[i], names[k - 1], held[i], size))
+            i = max(k, i + 1)
+    return found
+
+
+def _alike(off: Array) -> bool:
+    """Whether all are nearer to their mean than half its length."""
+    mean = off.mean(axis=0)
+    return bool(np.all(np.linalg.norm(off - mean, axis=1) < 0.5 * np.linalg.norm(mean)))

@@ -12,6 +12,7 @@ from jointscope.graphs.poses.calibrate_poses import PoseCalibration
 from jointscope.graphs.poses.determined import sigma_elsewhere
 from jointscope.graphs.poses.linear_poses import LinearPoses
 from jointscope.graphs.poses.pose_set import PoseSet
+from jointscope.graphs.poses.screen_contacts import moved_contacts
 from jointscope.graphs.poses.tip_errors import summary
 from jointscope.graphs.poses.untold_distances import untold_distance
 from jointscope.graphs.poses.what_moved import what_moved, with_ends
@@ -91,10 +92,24 @@ def _outliers(result: PoseCalibration) -> Check:
     text += "".join(f", {target} not in {count} of {seen[target] + count}" for target, count in odd.items())
     shares = [whole / total, *((whole + n) / (seen[target] + whole + n) for target, n in odd.items())]
     if max(shares) <= OUT:
-        return Check("good", name, f"{text}.")
+        return Check("good", name, f"{text}{_elsewhere_held(result)}.")
     hint = "look at each before you leave them out for good: targets or readings are wrong, or an effect is missing"
     out = "".join(f", {target} of {count} of {seen[target] + count}" for target, count in odd.items())
-    return Check("warn", name, f"{whole} of {total} poses{out} were left out; {hint}.")
+    together = _elsewhere_held(result)
+    return Check("warn", name, f"{whole} of {total} poses{out} were left out{together}; {hint}.")
+
+
+def _elsewhere_held(result: PoseCalibration) -> str:
+    """Poses that were left out because their contact was elsewhere."""
+    moved = moved_contacts(result.problems, result.whole, result.calibrations)
+    if not moved:
+        return ""
+    each = (f"{m.first} to {m.last} by {significant(1e3 * m.size, 2)} mm ({m.contact})" for m in moved[:SHOWN])
+    more = f" and {len(moved) - SHOWN} more" if len(moved) > SHOWN else ""
+    return (
+        f"; some are off together in one direction: {', '.join(each)}{more}: the plate was moved or gave way; hold it "
+        "fast, or give these poses a contact of their own"
+    )
 
 
 def _still(result: PoseCalibration) -> Check:

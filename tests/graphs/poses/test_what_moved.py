@@ -5,11 +5,13 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+import numpy as np
 import pytest
 from measured_poses import PANDA
 
 from jointscope.graphs.poses.calibrate_poses import calibrate_poses
 from jointscope.graphs.poses.linear_poses import LinearPoses
+from jointscope.graphs.poses.screen_contacts import moved_contacts
 from jointscope.graphs.poses.what_moved import what_moved, with_ends
 from jointscope.robots.files.robot_file import load_robot
 from jointscope.tools.bags.at_poses.read_poses import read_poses
@@ -79,3 +81,22 @@ def test_a_jump_is_found_with_a_ball_in_sockets_and_what_guiding_by_hand_leaves_
     step = found_in(panda, jumped(poses, 4, 4e-3, 100))[1]
     assert step.joint == "panda_joint4" and int(step.before) < 100 <= int(step.after)
     assert step.size == pytest.approx(4e-3, abs=1e-3)
+
+
+@pytest.mark.skipif(not PANDA.is_dir(), reason="shared/data/real/panda_sockets is not beside the project")
+def test_a_plate_that_moved_for_some_poses_is_told_with_them():
+    """A socket that is elsewhere is the same as targets that are: the joints turn to where it is."""
+    panda = load_robot("panda")
+    poses = read_poses(PANDA / "panda_1.csv", panda)
+    held = calibrate_poses(panda, [poses])
+    session = replace(held.problems[0], poses=poses)
+    J = session.point(held.calibrations[0]).by_joint
+    q = poses.q.copy()
+    q[70:78] += np.einsum("mij,mik,k->mj", J, np.linalg.inv(J @ np.swapaxes(J, 1, 2)), [0.0, 4e-3, 3e-3])[70:78]
+    result = calibrate_poses(panda, [replace(poses, q=q)])
+    (moved,) = moved_contacts(result.problems, result.whole, result.calibrations)
+    assert (moved.first, moved.last, moved.contact) == ("70", "77", "front/socket0")
+    assert moved.size == pytest.approx(5e-3, abs=5e-4)
+    assert moved_contacts(held.problems, held.whole, held.calibrations) == []
+    said = " ".join(check.text for check in judge_poses(result).checks)
+    assert "some are off together in one direction: 70 to 77 by" in said
