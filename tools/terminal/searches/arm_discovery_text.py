@@ -93,7 +93,7 @@ def limit_sentences(step: ArmStep) -> list[str]:
     count, said = step.result.count, list[str]()
     looked = [c for c in step.candidates if c.verdict not in ("missing", "untestable")]
     hinted = sorted((c for c in looked if c.times < MOST_TIMES), key=lambda c: c.times)
-    if hinted:
+    if hinted and not any(c.verdict == "missing" for c in step.candidates):  # or they may stand in for that one
         each = (f"{c.hypothesis.label} ({_size(c, c.sizes)}) with about {_more(c, count)} more" for c in hinted)
         said.append(f"More poses would tell: {', '.join(each)} like these, if it is there.")
     smallest: dict[str, list[ArmCandidate]] = {}
