@@ -14,6 +14,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 from scipy.special import gammaincc
+from scipy.stats import chi2
 
 from jointscope.graphs.joint_kinds.linear_kinds import LinearKind, LinearKinds
 from jointscope.graphs.poses.calibrate_poses import TOUCHED
@@ -21,6 +22,7 @@ from jointscope.robots.geometry.arm_effects import ArmHypothesis
 
 Array = NDArray[np.float64]
 CHANCE = 0.01  # of any false effect among all that are looked at
+HINT = 0.01  # chance at which an effect is worth more recordings
 MOST = 0.6  # share of the folds that must be met better
 GAIN = 0.02  # of the squared distances of what was left out
 
@@ -57,6 +59,8 @@ class ArmCandidate:
         look_alikes: labels of effects that would do the same here.
         verdict: missing, possible, absent or untestable.
         alone: by kind, effects that would do the same in this kind alone.
+        looks: number of orders or stiffnesses of which it is the best one.
+        wanted: fall of chi2 from which on it would be significant among all effects.
         explained_by: label of the likeliest missing effect, where with that in the model this one is not missing any
             more; "" for that one, and for what it leaves.
     """
@@ -71,12 +75,30 @@ class ArmCandidate:
     look_alikes: tuple[str, ...]
     verdict: str
     alone: Mapping[str, tuple[str, ...]]
+    looks: int
+    wanted: float
     explained_by: str = ""
 
     @property
     def beside_the_best(self) -> ArmCandidate:
         """The same, as a model with the likeliest missing effect sees it: possible where that explains it."""
         return replace(self, verdict="possible") if self.explained_by and self.verdict == "missing" else self
+
+    @property
+    def smallest(self) -> float:
+        """Size of the parameter that is told least well below which the effect would not be significant."""
+        return max(self.sigmas) * float(np.sqrt(self.wanted))
+
+    @property
+    def times(self) -> float:
+        """How many times as many recordings would make it significant, half the time, if it is what it looks like.
+
+        Chi2 falls in proportion to their number, but for what chance adds to the best of some looks. Infinite where
+        what was left out speaks against it, or where chance says as much of one of a hundred effects.
+        """
+        by_chance = len(self.sizes) + 2.0 * float(np.log(self.looks))
+        hinted = self.p_value < HINT and _shown(self.gains) and self.score > by_chance
+        return max((self.wanted - by_chance) / (self.score - by_chance), 1.0) if hinted else np.inf
 
     @property
     def gain(self) -> float:
@@ -134,9 +156,11 @@ class EffectJudge:
             verdict = "possible"
         if np.all(own > TOUCHED * sigmas):
             verdict = "untestable"
+        wanted = float(chi2.isf(CHANCE / (self._count * looks), size))
         return ArmCandidate(
-            hypothesis, score, p_value, gains, evidence, tuple(sizes.tolist()), tuple(own.tolist()), (), verdict, {}
-        )
+            hypothesis, score, p_value, gains, evidence, tuple(sizes.tolist()), tuple(own.tolist()), (), verdict, {},
+            looks, wanted,
+        )  # fmt: skip
 
     def explains(self, best: Looked, other: Looked) -> bool:
         """Whether an effect is not missing any more where another one is in the model."""

@@ -72,6 +72,7 @@ class PoseCalibration:
         left_out: poses, or targets of them, that fit nothing.
         iterations: of all passes.
         wall_seconds: of the whole.
+        whole: the sessions with the poses that were left out.
     """
 
     robot: Robot
@@ -88,6 +89,7 @@ class PoseCalibration:
     left_out: tuple[Outlier, ...]
     iterations: int
     wall_seconds: float
+    whole: tuple[PoseSet, ...]
 
     @property
     def told(self) -> tuple[str, ...]:
@@ -161,7 +163,8 @@ def calibrate_poses(
             break
         scale, turning, weighted = float(scale * changes[0]), float(turning * changes[1]), True
     seconds = time.perf_counter() - began
-    return _result(robot, problems, known[: len(problems)], covariance, before, ratio, out, iterations, seconds)
+    known = known[: len(problems)]
+    return _result(robot, problems, known, covariance, before, ratio, out, iterations, seconds, whole[0])
 
 
 def _must_be_poses(sessions: Sequence[Poses]) -> None:
@@ -255,6 +258,7 @@ def _result(
     out: Sequence[Outlier],
     iterations: int,
     seconds: float,
+    whole: Sequence[PoseSet],
 ) -> PoseCalibration:
     first, index = calibrations[0], calibrations[0].columns[DYNAMICS]
     own = covariance[index, index]
@@ -277,7 +281,7 @@ def _result(
     errors = tuple(tip_errors(problem, c) for problem, c in zip(problems, calibrations, strict=True))
     return PoseCalibration(
         found, robot, tuple(problems), tuple(calibrations), first.names, own, errors, before, told, scale, ratio,
-        tuple(out), iterations, seconds,
+        tuple(out), iterations, seconds, tuple(whole),
     )  # fmt: skip
 
 

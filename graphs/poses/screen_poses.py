@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from jointscope.factors.calibration import DYNAMICS, Calibration
 from jointscope.graphs.poses.pose_set import PoseSet
+from jointscope.graphs.poses.screen_contacts import screen_contacts
 from jointscope.graphs.poses.screen_targets import check_lost, screen_targets, screen_tool
 from jointscope.graphs.poses.tip_errors import contact_distances
 from jointscope.graphs.poses.tracker_start import tracker_and_target
@@ -40,6 +41,7 @@ def screen_poses(problems: Sequence[PoseSet]) -> None:
         if first.poses.target is not None and len(first.poses):
             _check_targets(first, first.poses.target)
         screen_tool(problem)
+        screen_contacts(problem)
         _check_contacts(problem)
     _check_number(problems)
 

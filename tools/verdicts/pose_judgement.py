@@ -9,12 +9,13 @@ import numpy as np
 
 from jointscope.factors.calibration import Calibration
 from jointscope.graphs.poses.calibrate_poses import PoseCalibration
-from jointscope.graphs.poses.elsewhere import sigma_elsewhere
+from jointscope.graphs.poses.determined import sigma_elsewhere
 from jointscope.graphs.poses.linear_poses import LinearPoses
 from jointscope.graphs.poses.pose_set import PoseSet
+from jointscope.graphs.poses.screen_contacts import moved_contacts
 from jointscope.graphs.poses.tip_errors import summary
 from jointscope.graphs.poses.untold_distances import untold_distance
-from jointscope.graphs.poses.what_moved import what_moved
+from jointscope.graphs.poses.what_moved import what_moved, with_ends
 from jointscope.robots.geometry.error_parameters import BACKLASH
 from jointscope.tools.presentation.numbers import significant
 from jointscope.tools.verdicts.judgement import Check, Judgement
@@ -91,16 +92,31 @@ def _outliers(result: PoseCalibration) -> Check:
     text += "".join(f", {target} not in {count} of {seen[target] + count}" for target, count in odd.items())
     shares = [whole / total, *((whole + n) / (seen[target] + whole + n) for target, n in odd.items())]
     if max(shares) <= OUT:
-        return Check("good", name, f"{text}.")
+        return Check("good", name, f"{text}{_elsewhere_held(result)}.")
     hint = "look at each before you leave them out for good: targets or readings are wrong, or an effect is missing"
     out = "".join(f", {target} of {count} of {seen[target] + count}" for target, count in odd.items())
-    return Check("warn", name, f"{whole} of {total} poses{out} were left out; {hint}.")
+    together = _elsewhere_held(result)
+    return Check("warn", name, f"{whole} of {total} poses{out} were left out{together}; {hint}.")
+
+
+def _elsewhere_held(result: PoseCalibration) -> str:
+    """Poses that were left out because their contact was elsewhere."""
+    moved = moved_contacts(result.problems, result.whole, result.calibrations)
+    if not moved:
+        return ""
+    each = (f"{m.first} to {m.last} by {significant(1e3 * m.size, 2)} mm ({m.contact})" for m in moved[:SHOWN])
+    more = f" and {len(moved) - SHOWN} more" if len(moved) > SHOWN else ""
+    return (
+        f"; some are off together in one direction: {', '.join(each)}{more}: the plate was moved or gave way; hold it "
+        "fast, or give these poses a contact of their own"
+    )
 
 
 def _still(result: PoseCalibration) -> Check:
-    """Whether the tracker stood still, and targets on the tool: no step in what is left, anywhere in a session."""
-    name = "A tracker that stands still, and targets that sit fast"
-    step = what_moved(LinearPoses.of(result), result.problems, result.calibrations)
+    """Whether tracker, targets and zeros of joints stayed: no step in what is left, anywhere in a session."""
+    name = "A tracker that stands still, targets that sit fast and joints that keep their zero"
+    problems = with_ends(result.problems, result.whole)
+    step = what_moved(LinearPoses.at(result.robot, problems, result.calibrations), problems, result.calibrations)
     if step is None:
         return Check("good", name, "The residuals show no step over the session.")
     return Check("bad", name, f"{step.text}.")

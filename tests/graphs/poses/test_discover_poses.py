@@ -3,6 +3,8 @@
 
 from __future__ import annotations
 
+import re
+
 import numpy as np
 import pytest
 
@@ -14,6 +16,7 @@ from jointscope.graphs.poses.tip_errors import tip_errors
 from jointscope.robots.errors import EffectError, SimulationError
 from jointscope.robots.files.robot_file import load_robot
 from jointscope.tools.simulator.pose_simulation import PoseConditions, simulate_poses
+from jointscope.tools.terminal.searches.arm_discovery_text import limit_sentences
 
 pytest.importorskip("mujoco", reason="the simulator needs the extra jointscope[sim]")
 
@@ -97,3 +100,33 @@ def test_effects_that_cannot_be_simulated_are_refused(tx90l, effect, told):
 def test_no_poses_are_no_simulation(tx90l):
     with pytest.raises(SimulationError, match="number of poses: expected 1 or more, got 0"):
         simulate_poses(tx90l, 0)
+
+
+HIDDEN = (
+    *(f"gear_ripple@joint{j}:amplitude=8e-5,order={n}" for j, n in ((1, 45), (2, 96), (3, 96))),
+    *(f"joint_elasticity@joint{j}:compliance=4e-5" for j in (4, 5, 6)),
+    *(f"spring_cubic@joint{j}:stiffness=4e10" for j in (2, 3)),
+    *(f"encoder_eccentricity@joint{j}:cos=1e-4,sin=1e-4" for j in (2, 4)),
+)
+
+
+def test_few_poses_say_how_many_more_would_tell_which_effect_and_so_many_do(tx90l):
+    """Forty poses of an arm with ten effects name one that they do not show; with as many more as they say it shows."""
+    conditions = PoseConditions(effects=HIDDEN)
+    few = discover_arm(tx90l, [simulate_poses(tx90l, 40, 60, conditions)[0]])
+    assert all(step.added is None or step.added.hypothesis.label != "gear_ripple@joint1" for step in few.steps)
+    said = limit_sentences(few.steps[-1])[0]
+    ripple, more = re.search(r"gear_ripple@joint1 \(([^ ]+) rad\) with about (\d+) more", said).groups()
+    assert ripple.startswith("8.") and "10⁻⁵" in ripple  # 8e-5 is true
+    assert 5 <= int(more) <= 20
+    enough = discover_arm(tx90l, [simulate_poses(tx90l, 40 + int(more), 60, conditions)[0]])
+    assert "gear_ripple@joint1" in [step.added.hypothesis.label for step in enough.steps[1:]]
+
+
+def test_a_payload_that_would_not_show_is_told_by_its_size(tx90l):
+    found = discover_arm(tx90l, [sessions(tx90l, 30, ["payload@robot:mass=0.5"])[0]])
+    assert len(found.steps) == 1
+    low = float(re.search(r"payload below ([\d.]+) kg", limit_sentences(found.steps[-1])[-1]).group(1))
+    assert 0.6 < low < 1.2
+    shown = discover_arm(tx90l, [sessions(tx90l, 30, [f"payload@robot:mass={2.0 * low}"])[0]])
+    assert shown.steps[1].added.hypothesis.label == "payload@robot"

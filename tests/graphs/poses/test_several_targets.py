@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import replace
 from itertools import islice
 
@@ -371,3 +372,41 @@ def in_socket(tree, ball, socket, rng):
         q = q - np.clip(np.linalg.pinv(J) @ (points[6] - socket), -0.5, 0.5)
     R, p = tree.body_poses("reflector", q[None])
     return q if np.linalg.norm(R[0] @ ball + p[0] - socket) < 1e-9 and np.abs(q).max() < 2.2 else None
+
+
+@pytest.mark.parametrize("anew", [False, True])
+def test_two_balls_without_names_are_told_with_their_places_and_poses(tmp_path, anew):
+    """On an arm whose errors are as large as those of real ones: their places come out to some millimetres."""
+    more = "  tool_sigma: 0.15\n  contact_distance: 0.05\n"
+    robot, single = tool_with(tmp_path / "two", "low: {}", more), tool_with(tmp_path / "one", "", more)
+    at, rng = (
+        {"reflector": np.array([0.01, -0.02, 0.03]), "low": np.array([0.06, 0.02, 0.01])},
+        np.random.default_rng(4),
+    )
+    q, contacts, held = [], [], []
+    for i in range(6):
+        for ball in at if not anew else (list(at)[i // 3],):
+            socket = np.array([0.5, 0.4 - 0.15 * i, 0.3 + 0.2 * (i % 2)])
+            tried = (in_socket(robot.tree, at[ball], socket, rng) for _ in range(90))
+            found = list(islice((angles for angles in tried if angles is not None), 6))
+            q += found
+            contacts += [f"socket{i}"] * len(found)
+            held += [ball] * len(found)
+    names = tuple(map(str, range(len(q))))
+    poses = Poses(
+        "sockets", "", names, np.array(q), None, tuple(contacts), tuple((c, c) for c in dict.fromkeys(contacts))
+    )
+    for each in (robot, single):
+        errors = {
+            n: p.prior_sigma * rng.standard_normal() for n, p in each.parameters.items() if ".l" in n and n[0] == "j"
+        }
+        with pytest.raises(RecordingError) as told:
+            calibrate_poses(each.with_values(errors), [poses])
+        text = str(told.value)
+        found = [np.array(s.split(","), float) for s in re.findall(r"at \[(.*?)\]", text)]
+        assert np.linalg.norm(np.array(found) - np.array(list(at.values())), axis=1).max() < 0.02
+        assert ("in contact socket0, socket1, socket2, at" in text) is anew
+        assert ("add a column `target`" in text) is (each is robot) and "two different targets" in text
+    named = replace(poses, held=tuple(held))
+    rigid = {n: p for n, p in robot.parameters.items() if "stiffness" not in n and "backlash" not in n}
+    assert calibrate_poses(replace(robot, parameters=rigid), [named]).count == len(q)

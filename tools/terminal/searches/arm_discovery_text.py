@@ -5,7 +5,9 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from jointscope.graphs.joint_kinds.discover_arm import ArmDiscovery
+import numpy as np
+
+from jointscope.graphs.joint_kinds.discover_arm import ArmDiscovery, ArmStep
 from jointscope.graphs.joint_kinds.effect_judge import ArmCandidate
 from jointscope.graphs.poses.tip_errors import TipErrors, summary
 from jointscope.robots.geometry.arm_effects import FREQUENCY, POSES
@@ -14,6 +16,7 @@ from jointscope.tools.presentation.numbers import percent, significant
 from jointscope.tools.terminal.text_table import text_table
 
 SHOWN = 8
+MOST_TIMES = 4.0  # as many poses: more than these are no advice
 TOLD = ("p90_mm", "max_mm")
 WORDS = {POSES: "poses", FREQUENCY: "responses"}
 ALONE = {POSES: "poses alone", FREQUENCY: "frequency responses alone"}
@@ -83,6 +86,45 @@ def unseen_sentences(candidates: Sequence[ArmCandidate], kinds: Sequence[str]) -
     return [f"{', '.join(ids)} not testable by {WORDS[kind]}: {why}" for (kind, why), ids in found.items() if ids]
 
 
+def limit_sentences(step: ArmStep) -> list[str]:
+    """What more poses would tell, and how large effects must be to show in these; nothing with other recordings."""
+    if step.calibrated.poses is None or step.calibrated.frequency is not None:
+        return []
+    count, said = step.result.count, list[str]()
+    looked = [c for c in step.candidates if c.verdict not in ("missing", "untestable")]
+    hinted = sorted((c for c in looked if c.times < MOST_TIMES), key=lambda c: c.times)
+    if hinted and not any(c.verdict == "missing" for c in step.candidates):  # or they may stand in for that one
+        each = (f"{c.hypothesis.label} ({_size(c, c.sizes)}) with about {_more(c, count)} more" for c in hinted)
+        said.append(f"More poses would tell: {', '.join(each)} like these, if it is there.")
+    smallest: dict[str, list[ArmCandidate]] = {}
+    for c in looked:
+        smallest.setdefault(c.hypothesis.kind.id, []).append(c)
+    if smallest:
+        each = (f"{kind} below {_range([c.smallest for c in found], found[0])}" for kind, found in smallest.items())
+        said.append(
+            f"In {counted(count, 'pose')}, with what this model leaves, these would not show, depending on the joint: "
+            f"{', '.join(each)}; four times as many poses show half as much."
+        )
+    return said
+
+
+def _more(candidate: ArmCandidate, count: int) -> int:
+    return max(int(np.ceil((candidate.times - 1.0) * count)), 1)
+
+
+def _size(candidate: ArmCandidate, sizes: Sequence[float]) -> str:
+    return f"{significant(float(np.linalg.norm(sizes)), 2)} {_unit(candidate)}"
+
+
+def _range(sizes: Sequence[float], candidate: ArmCandidate) -> str:
+    low, high = (significant(size, 2) for size in (min(sizes), max(sizes)))
+    return f"{low if low == high else f'{low} to {high}'} {_unit(candidate)}"
+
+
+def _unit(candidate: ArmCandidate) -> str:
+    return "rad/(N m)" if candidate.hypothesis.kind.soft else candidate.hypothesis.kind.unit
+
+
 def arm_discovery_text(found: ArmDiscovery) -> str:
     """The steps, and what was looked at last."""
     head, rows = step_table(found)
@@ -103,6 +145,7 @@ def arm_discovery_text(found: ArmDiscovery) -> str:
         *said,
         ranking_text(last.candidates, recordings_said(found), found.kinds),
         *unseen_sentences(last.candidates, found.kinds if len(found.kinds) > 1 else ()),
+        *limit_sentences(last),
     ]
     return "\n\n".join(parts)
 

@@ -53,6 +53,7 @@ def run_arm_search(
     from jointscope.tools.terminal.searches.arm_discovery_text import (
         arm_discovery_text,
         explained_sentences,
+        limit_sentences,
         ranking_text,
         recordings_said,
         told_apart,
@@ -78,6 +79,7 @@ def run_arm_search(
         leading = [c for c in candidates if c.verdict == "missing"][:3]
         said = explained_sentences(candidates) + [line for c in leading for line in told_apart(c)]
         said += unseen_sentences(candidates, found.kinds if len(found.kinds) > 1 else ())
+        said += limit_sentences(found.steps[0])
         return "\n\n".join([ranking_text(candidates, recordings_said(found), found.kinds), *said])
     found = discover_arm(robot, sessions, held, progress, recordings, held_shaken)
     write_still(files, found.robot, _origin(found, robot), partial(_page, found), _discovery(found, files.robot))
