@@ -18,6 +18,7 @@ import numpy as np
 
 from jointscope.factors.calibration import DYNAMICS, Calibration, rotation_block
 from jointscope.graphs.calibration.calibration_summary import Solved
+from jointscope.graphs.calibration.solved_windows import anchored
 from jointscope.graphs.calibration.stages.convergence_asked import must_converge
 from jointscope.graphs.calibration.whole_stage import (
     BELOW_ITERATIONS,
@@ -25,7 +26,6 @@ from jointscope.graphs.calibration.whole_stage import (
     MOST_ITERATIONS,
     SMALL_STEP,
     WholeStage,
-    anchored,
 )
 from jointscope.graphs.noise.lasting_noise import states_in
 from jointscope.graphs.noise.noise_estimation import densities, estimate_noise, scaled
