@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -13,6 +12,7 @@ from jointscope.robots.files.robot_file import load_robot
 from jointscope.robots.model.robot import Robot
 from jointscope.robots.recordings.poses import Poses
 from jointscope.robots.rests.rests import Rests
+from jointscope.tools.bags.write_bag import joint_states, write_topics
 from jointscope.tools.simulator.pose_simulation import PoseConditions, simulate_poses
 
 LINK = """  link_encoder: {kind: link_encoder, topic: /link_states, type: sensor_msgs/msg/JointState, field: position,
@@ -58,6 +58,22 @@ def rested(robot: Robot, count: int, seed: int, softer: float = 1.0, **condition
     )  # fmt: skip
 
 
-def replaced_path(rests: Rests, path: str) -> Rests:
-    """The same rests under another name."""
-    return replace(rests, path=path)
+def write_rests(path: Path, rests: Rests) -> Path:
+    """A bag in which the arm stands for three seconds at each rest and moves for one in between."""
+    rate, (m, n) = 100, rests.u.shape
+    stamps = np.arange(4 * rate * m) * (10**9 // rate) + 1_700_000_000_000_000_000
+    share = np.clip((np.arange(4 * rate) - 3 * rate) / rate, 0.0, 1.0)[:, None]
+    noise = np.random.default_rng(0).normal(size=(2, len(stamps), n))
+
+    def held(values):
+        after = np.vstack([values[1:], values[-1:]])
+        return np.concatenate([a + share * (b - a) for a, b in zip(values, after, strict=True)])
+
+    names = [f"joint{j + 1}" for j in range(n)]
+    sides = {"/joint_states": rests.q_motor, "/link_states": rests.q_link}
+    topics = [
+        joint_states(topic, names, stamps, {"position": held(q) + sigma * each})
+        for (topic, q), each, sigma in zip(sides.items(), noise, (1e-6, SIGMA), strict=True)
+    ]
+    write_topics(path, [*topics, joint_states("/motor_command", names, stamps, {"effort": held(rests.u)})])
+    return path

@@ -52,12 +52,6 @@ def check_one_kind(
             f"a search takes motion apart from {other}; `jointscope calibrate` takes all kinds together: search with "
             "one of them, and give the robot file that it writes as ROBOT with the other"
         )
-    if rests and (poses or frequency) and not bags:
-        other = "--poses" if poses else "--frequency"
-        raise RecordingError(
-            f"--rests and {other} go into one estimate where motion is there, too (`jointscope calibrate ROBOT BAG "
-            f"--rests ... {other} ...`); without, give the robot file that {other} writes as ROBOT with --rests"
-        )
     still = {"rests": rests or (), "poses": poses, "frequency responses": frequency or ()}
     twice = next(((path, kind) for kind, paths in still.items() for path in bags if path in paths), None)
     if twice is not None:
