@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The report of several kinds without motion, poses, frequency responses, rests: do they agree, then the parts of each."""
+"""The report of poses, frequency responses and rests in one estimate: do they agree, then the parts of each."""
 
 from __future__ import annotations
 
