@@ -21,20 +21,14 @@ from jointscope.tools.verb_parts.result_files import ResultFiles, write_still
 from jointscope.tools.writing.origin import made_from, other_kinds
 
 
-def check_rests_alone(args: argparse.Namespace) -> None:
-    """Rests are searched alone.
+def check_held_out_rests(args: argparse.Namespace) -> None:
+    """Held-out rests go with others.
 
     Raises:
-        RecordingError: another kind beside them, a recording twice, or none that the held-out ones go with.
+        RecordingError: a recording twice, or none that the held-out ones go with.
     """
     if args.holdout_rests and not args.rests:
         raise RecordingError("--holdout-rests goes with --rests")
-    if args.rests and (args.bags or args.poses or args.frequency):
-        other = "recordings of motion" if args.bags else "--poses" if args.poses else "--frequency"
-        raise RecordingError(
-            f"a search takes --rests alone, not yet with {other}; search with --rests, and give the robot file that "
-            "`discover` writes as ROBOT with the others (`jointscope calibrate` takes motion and --rests together)"
-        )
     twice = next((path for path in args.holdout_rests if path in args.rests), None)
     if twice is not None:
         raise RecordingError(f"{twice} is given with --rests and held out; leave it out once")

@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 import argparse
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass
 from functools import partial
@@ -129,8 +129,21 @@ def write_comparison(result: Any, files: ResultFiles, checked: AcceptedBy = NO_L
         _write_views(stack, result, files, report, log_comparison, lambda: said)
 
 
-def write_diagnosis(result: Any, files: ResultFiles, checked: AcceptedBy = NO_LIMITS) -> None:
+def write_diagnosis(
+    result: Any,
+    files: ResultFiles,
+    checked: AcceptedBy = NO_LIMITS,
+    first: Sequence[Any] = (),
+    content: Mapping[str, Any] | None = None,
+) -> None:
     """Writes a Diagnosis, and which limits its model keeps.
+
+    Args:
+        result: what was found.
+        files: where to.
+        checked: limits that the user has declared, as they came out.
+        first: sections of the report before all others.
+        content: of the JSON, in place of what is there or beside it.
 
     Raises:
         JointscopeError: a file cannot be written; then none is.
@@ -139,7 +152,8 @@ def write_diagnosis(result: Any, files: ResultFiles, checked: AcceptedBy = NO_LI
         from jointscope.tools.report import diagnosis_report
         from jointscope.tools.rerun_log import log_diagnosis
 
-        report, said = partial(diagnosis_report, checked=checked), acceptance_json(checked)
+        report, said = partial(diagnosis_report, checked=checked, first=first), {**(content or {})}
+        said |= acceptance_json(checked)
         _write_views(stack, result, files, report, log_diagnosis, lambda: said)
 
 
