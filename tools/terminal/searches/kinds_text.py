@@ -65,8 +65,8 @@ def kinds_sentences(found: KindsDiagnosis) -> list[str]:
                 "both and shows the latter"
             )
         for kind, labels in c.told_apart.items() if c.verdict == "missing" else ():
-            others = " or ".join([c.label, *c.look_alikes])
-            lines.append(f"{' or '.join(labels)} would do the same in another kind; with {WORDS[kind]}: {others}")
+            left = " or ".join([c.label, *c.look_alikes])
+            lines.append(f"{' or '.join(labels)} would do the same in another kind; with {WORDS[kind]}: {left}")
     return lines
 
 
