@@ -20,6 +20,7 @@ from jointscope.graphs.across_kinds.said_by_kinds import (
     said_by_arm,
     said_by_motion,
     said_by_rests,
+    unseen_by_arm,
 )
 from jointscope.graphs.discovery.diagnose import diagnose
 from jointscope.graphs.discovery.diagnosis_result import Diagnosis
@@ -111,4 +112,7 @@ def diagnose_kinds(
     said |= said_by_arm(arm, kinds)
     if at_rest is not None:
         said[RESTS] = said_by_rests(at_rest.candidates)
+    others = [label for kind, each in said.items() if kind not in kinds for label in each]
+    for kind, each in unseen_by_arm(others, kinds).items():
+        said[kind] = said[kind] | {label: nothing for label, nothing in each.items() if label not in said[kind]}
     return KindsDiagnosis(robot, across_kinds(said), motion, tuple(arm), tuple(kinds), at_rest)

@@ -18,6 +18,8 @@ from dataclasses import dataclass, replace
 from jointscope.graphs.discovery.diagnosis_result import Diagnosis
 from jointscope.graphs.joint_kinds.effect_judge import ArmCandidate
 from jointscope.graphs.rest_search.rest_judge import RestCandidate
+from jointscope.robots.geometry.arm_effects import KINDS
+from jointscope.robots.geometry.error_parameters import STIFFNESS
 
 MOTION, RESTS = "motion", "rests"
 APART, SHARE = 3.0, 0.5  # [sigma], share of the larger one: from both on sizes in two kinds contradict each other
@@ -167,7 +169,7 @@ def said_by_arm(candidates: Sequence[ArmCandidate], kinds: Sequence[str]) -> dic
     for c in candidates:
         unit = "rad/(N m)" if c.hypothesis.kind.soft else c.hypothesis.kind.unit
         pairs = zip(c.hypothesis.names, c.sizes, c.sigmas, strict=True)
-        sizes = {name.rpartition(".")[2]: (value, sigma, unit) for name, value, sigma in pairs}
+        sizes = {_last_part(name, c.hypothesis.kind.soft): (value, sigma, unit) for name, value, sigma in pairs}
         for kind in kinds:
             unseen = c.hypothesis.kind.unseen.get(kind, "")
             verdict = "untestable" if unseen else c.verdict
@@ -175,3 +177,25 @@ def said_by_arm(candidates: Sequence[ArmCandidate], kinds: Sequence[str]) -> dic
                 verdict = "possible"
             found[kind][c.hypothesis.label] = Said(verdict, sizes, c.alone.get(kind, c.look_alikes), unseen)
     return found
+
+
+def unseen_by_arm(labels: Iterable[str], kinds: Sequence[str]) -> dict[str, dict[str, Said]]:
+    """Effects that other kinds know, and that do nothing in poses or in frequency responses, by kind and label.
+
+    Args:
+        labels: of the effects.
+        kinds: of the recordings that there are.
+    """
+    unseen, found = {kind.id: kind.unseen for kind in KINDS}, dict[str, dict[str, Said]]()
+    for label in labels:
+        for kind in kinds:
+            why = unseen.get(label.partition("@")[0], {}).get(kind)
+            if why is not None:
+                found.setdefault(kind, {})[label] = Said("untestable", {}, (), why)
+    return found
+
+
+def _last_part(name: str, soft: bool) -> str:
+    """Of the name of a parameter; stiffnesses that are looked for have the sizes of their compliances."""
+    last = name.rpartition(".")[2]
+    return last.replace(STIFFNESS, "compliance") if soft else last

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 import numpy as np
@@ -27,6 +28,18 @@ def resting_axes(folder: Path) -> Robot:
     path = geometry_in_doubt(folder).path
     text = path.read_text(encoding="utf-8").replace("frequency:\n  joints", f"{LINK}frequency:\n  joints")
     path.write_text(text, encoding="utf-8")
+    return load_robot(path)
+
+
+def stiff_axes(folder: Path) -> Robot:
+    """The same arm with rigid joints, for motion and poses."""
+    text = three_axes(folder).path.read_text(encoding="utf-8")
+    text = text.replace("{integrator: simpson}", "{rigid_joints: [joint1, joint2, joint3]}")
+    poses = geometry_in_doubt(folder).path.read_text(encoding="utf-8")
+    section = next(line for line in poses.splitlines() if line.startswith("poses:"))
+    text = re.sub(r"frequency:\n  joints.*", section, text)
+    path = folder / "stiff_axes.yaml"
+    path.write_text(re.sub(r"  joint\d\.(stiffness|damping):.*\n", "", text), encoding="utf-8")
     return load_robot(path)
 
 

@@ -8,11 +8,13 @@ from dataclasses import replace
 
 import pytest
 from lever_bench import C0, hanging, lever
+from resting_axes import stiff_axes
 
 from jointscope import simulate
 from jointscope.graphs.across_kinds.diagnose_kinds import diagnose_kinds
 from jointscope.tools.bags.write_bag import write_bag
 from jointscope.tools.command_line import main
+from jointscope.tools.simulator.pose_simulation import PoseConditions, simulate_poses
 from jointscope.tools.terminal.searches.kinds_text import kinds_headline, kinds_sentences
 from jointscope.tools.verb_parts.searches import kinds_search
 
@@ -103,3 +105,27 @@ def test_the_command_says_which_kind_shows_it_and_discover_says_what_to_do(rod, 
     assert main(["discover", *given, "-o", str(tmp_path / "o.yaml")]) == 1
     error = capsys.readouterr().err
     assert "says which kind shows what is missing: discover with that kind" in error and error.count("\n") == 1
+
+
+@pytest.mark.slow
+def test_motion_and_poses_of_an_arm_show_what_the_other_cannot(tmp_path):
+    pytest.importorskip("mujoco", reason="arms are moved by MuJoCo, which the extra `sim` brings")
+    robot = stiff_axes(tmp_path)
+    drift = PoseConditions(effects=["tracker_drift@robot:x=3e-4,z=0"], perfect=True)
+    poses, truth = simulate_poses(robot, 40, 3, drift)
+    dry = {name: truth["parameters"][name] for name in robot.parameters if name.endswith("coulomb_torque")}
+    constant = ["torque_constant_error@joint2:share=0.05"]
+    motion = simulate(
+        robot, seconds=6.0, seed=3, encoder_rate=250.0, effects=constant, parameters=dry, friction="smooth"
+    ).recording
+    found = diagnose_kinds(robot, [motion], sessions=[poses], missing_torque=False)
+    said = "Missing: torque_constant_error@joint2, shown by motion; tracker_drift@robot, shown by poses."
+    assert kinds_headline(found) == said
+    effects = by_label(found)
+    for label, kind, name, true in (
+        ("torque_constant_error@joint2", "motion", "share", 0.05),
+        ("tracker_drift@robot", "poses", "x", 3e-4),
+    ):
+        value, sigma, _ = effects[label].by_kind[kind].sizes[name]
+        assert abs(value - true) < 3.0 * sigma
+    assert effects["torque_constant_error@joint2"].by_kind["poses"].verdict == "untestable"

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import pytest
 
-from jointscope.graphs.across_kinds.said_by_kinds import Said, across_kinds
+from jointscope.graphs.across_kinds.said_by_kinds import Said, across_kinds, unseen_by_arm
 
 
 def said(verdict, size=1.0, sigma=0.1, alike=(), unit="N m"):
@@ -59,3 +59,9 @@ def test_effects_that_more_kinds_show_come_first():
     one = {"a@j": said("missing"), "b@j": said("missing"), "c@j": said("absent")}
     found = across_kinds({"motion": one, "rests": {"b@j": said("missing"), "d@j": said("possible")}})
     assert [c.label for c in found] == ["b@j", "a@j", "d@j", "c@j"]
+
+
+def test_effects_of_motion_that_do_nothing_in_poses_are_untestable_by_them():
+    found = unseen_by_arm(["torque_delay@robot", "payload@robot", "cogging@j"], ["poses", "frequency"])
+    assert set(found) == {"poses"} and set(found["poses"]) == {"torque_delay@robot"}
+    assert found["poses"]["torque_delay@robot"].why == "nothing moves at rest"
