@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Several kinds of recordings of an arm in one estimate: frequency responses and poses; one robot file out."""
+"""Several kinds of recordings of an arm in one estimate: frequency responses, poses, rests; one robot file out."""

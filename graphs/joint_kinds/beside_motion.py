@@ -60,8 +60,9 @@ def calibrate_beside_motion(
     summary = alone.summary.without_friction()
     for _ in range(MOST_PASSES):
         result = calibrate(robot, recordings, sets=[*sets, summary], progress=report, **options)
-        there = summary_at(summary, result.robot)
-        if moved(result, summary, there) < AGREES:
+        there = summary_at(summary, result.robot).without_friction()
+        at, C, _ = _values(result, summary.names)
+        if moved(at, C, summary, there) < AGREES:
             break
         summary = there
     return replace(result, wall_seconds=time.perf_counter() - began)
@@ -72,12 +73,18 @@ def summary_at(summary: FrequencySummary, robot: Robot) -> FrequencySummary:
     problems = [problem.of_robot(_of_names(problem.robot, robot, summary.names)) for problem in summary.problems]
     calibration = Calibration.of(problems[0].robot).only([DYNAMICS])
     stages = [next_stage(problem, calibration) for problem in problems]
-    return FrequencySummary.of(stages, calibration).without_friction()
+    return FrequencySummary.of(stages, calibration)
 
 
-def moved(result: CalibrationResult, summary: FrequencySummary, there: FrequencySummary) -> float:
-    """How far the values of all kinds would go if the factor were the one that was found there, largest in sigmas."""
-    at, C, _ = _values(result, summary.names)
+def moved(at: Array, C: Array, summary: FrequencySummary, there: FrequencySummary) -> float:
+    """How far the values of all kinds would go if the factor were the one that was found there, largest in sigmas.
+
+    Args:
+        at: coordinates of the factor's values that all kinds have, shape (p,).
+        C: their covariance, shape (p, p).
+        summary: the factor that all kinds had.
+        there: the one that was found at these values.
+    """
     pull = [one.information @ (one.preferred - at) for one in (summary, there)]
     step = np.linalg.solve(np.linalg.inv(C) + there.information - summary.information, pull[1] - pull[0])
     return float(np.max(np.abs(step) / np.sqrt(np.diag(C))))

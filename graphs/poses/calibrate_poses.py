@@ -35,6 +35,7 @@ from jointscope.graphs.poses.trimmed_poses import (
 )
 from jointscope.graphs.poses.two_noises import noise_ratios
 from jointscope.graphs.poses.what_moved import what_moved
+from jointscope.graphs.rests.independent_states import reduced
 from jointscope.graphs.solving.batch_solver import Progress, solve
 from jointscope.graphs.solving.estimate import Estimate
 from jointscope.graphs.solving.posterior import posteriors
@@ -113,7 +114,7 @@ def calibrate_poses(
         robot: with a section `poses`.
         sessions: poses with one place of the tracker each; contacts of several sessions have names of their own.
         progress: called with a text and the share done.
-        others: recordings of other kinds in the same graph, without blocks or states of their own.
+        others: recordings of other kinds in the same graph, without blocks of their own.
 
     Raises:
         RobotError: the robot has no such section.
@@ -129,11 +130,13 @@ def calibrate_poses(
     out: list[Outlier] = []
     scale, turning, weighted, iterations = 1.0, 1.0, False, 0
     known: Sequence[Calibration] = ()
+    states: Sequence[Array] = ()
     for i in range(PASSES):
         problems = [replace(problem, repeatability=scale, turning=turning) for problem in problems]
         everything = [*problems, *others]
-        solution = solve(everything, _estimate(everything, known), max_iterations=MOST_ITERATIONS, progress=None)
+        solution = solve(everything, _estimate(everything, known, states), max_iterations=MOST_ITERATIONS)
         iterations, known = iterations + len(solution.iterations), solution.estimate.calibrations
+        states = solution.estimate.states[len(problems) :]
         report(f"pass {i + 1}, cost {solution.cost:.6g}", (i + 1) / PASSES)
         if not (solution.converged or solution.flat):
             raise SolveError(
@@ -154,8 +157,8 @@ def calibrate_poses(
             _must_be_few(out, problems, *whole)
             continue
         covariance = posteriors(everything, solution)[1]
-        pairs = zip(others, known[len(problems) :], strict=True)
-        elsewhere = [other.linearize(np.zeros((0, 1)), c).C for other, c in pairs]
+        each = zip(others, states, known[len(problems) :], strict=True)
+        elsewhere = [reduced(other.linearize(x, c))[0] for other, x, c in each]
         ratio = _chi2(problems, known[0], covariance, distances, elsewhere)
         own = [solution.shared.indices(k) for k in range(len(problems))]
         changes = _changes(problems, known[: len(problems)], [covariance[np.ix_(k, k)] for k in own], ratio)
@@ -178,14 +181,21 @@ def _must_be_poses(sessions: Sequence[Poses]) -> None:
         )
 
 
-def _estimate(problems: Sequence[SetProblem], known: Sequence[Calibration]) -> Estimate:
-    """Where to go on: at values that were found before, perhaps with other poses, or at the start values."""
+def _estimate(problems: Sequence[SetProblem], known: Sequence[Calibration], states: Sequence[Array]) -> Estimate:
+    """Where to go on: at values that were found before, perhaps with other poses, or at the start values.
+
+    Args:
+        problems: poses first.
+        known: values that were found.
+        states: of the last problems, which did not change.
+    """
     starts = [problem.start(Calibration.of(problem.robot)) for problem in problems]
     found = [start for _, start in starts]
     if known:
         pairs = zip(found, known, strict=True)
         found = [start.with_points({name: other[name] for name in start.layout}) for start, other in pairs]
-    return Estimate(tuple(x for x, _ in starts), tuple(found))
+    begun = [x for x, _ in starts]
+    return Estimate((*begun[: len(begun) - len(states)], *states), tuple(found))
 
 
 def _must_be_few(

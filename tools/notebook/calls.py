@@ -223,7 +223,8 @@ def graph(result: CalibrationResult | ArmCalibration, per_sample: bool = False) 
     """The GTSAM graph of a calibration.
 
     Args:
-        result: of `calibrate`; also of `calibrate_poses`, `calibrate_frequency` and `calibrate_kinds`.
+        result: of `calibrate`; also of `calibrate_poses`, `calibrate_frequency`, `calibrate_kinds` and
+            `calibrate_with_rests`.
         per_sample: one factor for every sample, instead of one for every thousand; of motion alone.
 
     Raises:

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 
 from jointscope.graphs.discovery.diagnosis_result import Diagnosis
@@ -26,12 +27,13 @@ from jointscope.tools.report.sections.diagnosis.torque_over_time import torque_o
 from jointscope.tools.report.sections.diagnosis.untestable import untestable
 
 
-def diagnosis_report(result: Diagnosis, checked: AcceptedBy = NO_LIMITS) -> str:
+def diagnosis_report(result: Diagnosis, checked: AcceptedBy = NO_LIMITS, first: Sequence[Section] = ()) -> str:
     """The whole page as text.
 
     Args:
         result: what the diagnosis found.
         checked: limits that the user has declared, as they came out.
+        first: sections before all others.
 
     Returns:
         HTML without references to anything outside of itself.
@@ -39,6 +41,7 @@ def diagnosis_report(result: Diagnosis, checked: AcceptedBy = NO_LIMITS) -> str:
     recordings = [*result.recordings, *([result.heldout] if result.heldout is not None else [])]
     seconds = sum(result.wall_seconds.values()) if result.wall_seconds else None
     sections = [
+        *first,
         diagnosis_verdict(result),
         *acceptance(checked),
         ranking(result),

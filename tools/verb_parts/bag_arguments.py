@@ -13,7 +13,7 @@ from jointscope.robots.recordings.recording import Recording
 from jointscope.tools.presentation.left_out import add_leave_out_option, leave_out
 from jointscope.tools.terminal.progress import Progress, reading
 from jointscope.tools.verb_parts.pose_runs import check_one_kind
-from jointscope.tools.verb_parts.rest_runs import check_rests_alone
+from jointscope.tools.verb_parts.rest_runs import check_held_out_rests
 from jointscope.tools.verb_parts.user_effects import add_effects_option
 
 KINDS = {
@@ -82,8 +82,8 @@ def check_kind(args: argparse.Namespace) -> None:
         "--scheduler": args.scheduler is not None,
         "--workers": args.workers > 1,
     }
-    check_rests_alone(args)
-    check_one_kind(args.bags, args.poses, args.rests, of_motion, args.frequency, search=True)
+    check_held_out_rests(args)
+    check_one_kind(args.bags, args.poses, args.rests, of_motion, args.frequency)
     if args.holdout_poses and not args.poses:
         raise RecordingError("--holdout-poses goes with --poses")
     if args.holdout_frequency and not args.frequency:

@@ -152,25 +152,32 @@ def run_kinds_calibration(
     sessions = [read_poses(path, robot) for path in poses]
     result = calibrate_kinds(robot, read_all_shaken(robot, bags, progress), sessions, progress)
     lacks = _lacking(Calibrated(result.poses, result.frequency), progress)
-    both, (alone, joint) = result.frequency.to_json() | lacks[1], result.pose_squares
-    silent = set(result.frequency.silent)
-    judgement = judge_kinds(result)
-    content = both | pose_json(result.poses) | judgement.to_json() | {
-        "iterations": result.frequency.iterations + result.poses.iterations,
-        "samples": both["samples"] + result.poses.count,
-        "wall_seconds": result.wall_seconds,
-        "undetermined": [*result.poses.determined.combinations, *({name: 1.0} for name in sorted(silent))],
-        "agreement": {
-            "chi2": result.agreement.chi2,
-            "dof": result.agreement.dof,
-            "p_value": result.agreement.p_value,
-            "squares": {"poses_alone": alone, "poses": joint, "frequency": result.frequency_squares},
-        },
-    }  # fmt: skip
+    content = kinds_json(result) | lacks[1]
     checked = check_models(limits, {robot.name: content})
     page, content = partial(kinds_report, result, checked), content | acceptance_json(checked)
     made = pose_origin(result.poses, robot) | frequency_origin(result.frequency, robot)
     write_still(files, result.robot, made, page, content, urdf_files(result.robot, urdf))
+    judgement = judge_kinds(result)
     agree = "\n".join(f"  - {sentence}" for sentence in kinds_sentences(result))
     texts = [pose_calibration_text(result.poses), frequency_calibration_text(result.frequency)]
     return "\n\n".join([f"{judgement.headline}\n{agree}", *lacks[0], *texts]), checked
+
+
+def kinds_json(result: Any) -> dict[str, Any]:
+    """A calibration from poses and frequency responses for machines."""
+    from jointscope.tools.verdicts.frequency_judgement import judge_kinds
+
+    responses, (alone, joint) = result.frequency.to_json(), result.pose_squares
+    return responses | pose_json(result.poses) | judge_kinds(result).to_json() | {
+        "iterations": result.frequency.iterations + result.poses.iterations,
+        "samples": responses["samples"] + result.poses.count,
+        "wall_seconds": result.wall_seconds,
+        "undetermined": [*result.poses.determined.combinations, *({n: 1.0} for n in sorted(result.frequency.silent))],
+        "agreement": agreement_json(result.agreement)
+        | {"squares": {"poses_alone": alone, "poses": joint, "frequency": result.frequency_squares}},
+    }  # fmt: skip
+
+
+def agreement_json(found: Any) -> dict[str, Any]:
+    """Whether kinds tell the same."""
+    return {"chi2": found.chi2, "dof": found.dof, "p_value": found.p_value}

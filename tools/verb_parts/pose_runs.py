@@ -25,7 +25,6 @@ def check_one_kind(
     rests: Sequence[Path] | None,
     options: Mapping[str, bool],
     frequency: Sequence[Path] | None = None,
-    search: bool = False,
 ) -> None:
     """Kinds of recordings that go together, and no option of another.
 
@@ -35,7 +34,6 @@ def check_one_kind(
         rests: as given; None of a verb that takes none.
         options: of recordings of motion, and whether they are given.
         frequency: as given; None of a verb that takes none.
-        search: whether effects are looked for, which takes fewer kinds at once.
 
     Raises:
         RecordingError: none, kinds that do not go together, or such an option without motion.
@@ -45,18 +43,6 @@ def check_one_kind(
         other += "" if frequency is None else ", or --frequency BAG"
         raise RecordingError(
             f"nothing to calibrate from; expected BAG... before the first option, or --poses FILE{other}"
-        )
-    if bags and search and (poses or frequency):
-        other = "--poses" if poses else "--frequency"
-        raise RecordingError(
-            f"a search takes motion apart from {other}; `jointscope calibrate` takes all kinds together: search with "
-            "one of them, and give the robot file that it writes as ROBOT with the other"
-        )
-    if rests and (poses or frequency) and not bags:
-        other = "--poses" if poses else "--frequency"
-        raise RecordingError(
-            f"--rests and {other} go into one estimate where motion is there, too (`jointscope calibrate ROBOT BAG "
-            f"--rests ... {other} ...`); without, give the robot file that {other} writes as ROBOT with --rests"
         )
     still = {"rests": rests or (), "poses": poses, "frequency responses": frequency or ()}
     twice = next(((path, kind) for kind, paths in still.items() for path in bags if path in paths), None)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""`calibrate` and `compare` with --rests: rests in, robot file, report and JSON out."""
+"""`calibrate` and `compare` with --rests, alone or with other kinds: rests in, robot file, report and JSON out."""
 
 from __future__ import annotations
 
@@ -15,24 +15,20 @@ from jointscope.robots.rests.rests import Rests
 from jointscope.tools.acceptance.evaluation import AcceptedBy, acceptance_json, check_models
 from jointscope.tools.acceptance.limits import Limit
 from jointscope.tools.terminal.progress import Progress
+from jointscope.tools.verb_parts.frequency_runs import agreement_json, frequency_origin, kinds_json, read_all_shaken
+from jointscope.tools.verb_parts.pose_runs import pose_json, pose_origin, urdf_files
 from jointscope.tools.verb_parts.result_files import ResultFiles, write_still
 from jointscope.tools.writing.origin import made_from, other_kinds
 
 
-def check_rests_alone(args: argparse.Namespace) -> None:
-    """Rests are searched alone.
+def check_held_out_rests(args: argparse.Namespace) -> None:
+    """Held-out rests go with others.
 
     Raises:
-        RecordingError: another kind beside them, a recording twice, or none that the held-out ones go with.
+        RecordingError: a recording twice, or none that the held-out ones go with.
     """
     if args.holdout_rests and not args.rests:
         raise RecordingError("--holdout-rests goes with --rests")
-    if args.rests and (args.bags or args.poses or args.frequency):
-        other = "recordings of motion" if args.bags else "--poses" if args.poses else "--frequency"
-        raise RecordingError(
-            f"a search takes --rests alone, not yet with {other}; search with --rests, and give the robot file that "
-            "`discover` writes as ROBOT with the others (`jointscope calibrate` takes motion and --rests together)"
-        )
     twice = next((path for path in args.holdout_rests if path in args.rests), None)
     if twice is not None:
         raise RecordingError(f"{twice} is given with --rests and held out; leave it out once")
@@ -70,6 +66,81 @@ def run_rest_calibration(
     page, content = partial(rests_report, result, checked), content | acceptance_json(checked)
     write_still(files, result.robot, made_from(robot.path.name) | other_kinds(result), page, content)
     return rest_calibration_text(result), checked
+
+
+def run_calibration_with_rests(
+    robot: Robot,
+    rests: Sequence[Path],
+    poses: Sequence[Path],
+    shaken: Sequence[Path],
+    files: ResultFiles,
+    urdf: Path | None,
+    limits: Sequence[Limit],
+    progress: Progress,
+) -> tuple[str, AcceptedBy]:
+    """Calibrates from rests and other kinds, writes the files, and returns the screen's text and which limits are kept.
+
+    Raises:
+        RobotError: a viewer recording was asked for, or the robot file lacks a section.
+        JointscopeError: recordings cannot be used, or a file cannot be written; then none is.
+    """
+    from jointscope.graphs.joint_kinds.calibrate_with_rests import calibrate_with_rests
+    from jointscope.tools.bags.at_poses.read_poses import read_poses
+    from jointscope.tools.report.kinds_report import with_rests_report
+    from jointscope.tools.terminal.poses_text import pose_calibration_text
+    from jointscope.tools.terminal.responses_text import frequency_calibration_text
+    from jointscope.tools.terminal.rests_text import rest_calibration_text
+
+    if files.rrd is not None:
+        raise RobotError(f"{robot.name}: --rrd shows motion, not rests; use --report")
+    at_rest, sessions = read_all_rests(rests, robot, progress), [read_poses(path, robot) for path in poses]
+    result = calibrate_with_rests(robot, at_rest, sessions, read_all_shaken(robot, shaken, progress), progress)
+    content = _with_rests_json(result)
+    checked = check_models(limits, {robot.name: content})
+    made = made_from(robot.path.name) | other_kinds(result.rests)
+    texts = []
+    if result.poses is not None:
+        made |= pose_origin(result.poses, robot)
+        texts.append(pose_calibration_text(result.poses))
+    if result.frequency is not None:
+        made |= frequency_origin(result.frequency, robot)
+        texts.append(frequency_calibration_text(result.frequency))
+    page, content = partial(with_rests_report, result, checked), content | acceptance_json(checked)
+    write_still(files, result.robot, made, page, content, urdf_files(result.robot, urdf))
+    return "\n\n".join([_said(result), *texts, rest_calibration_text(result.rests)]), checked
+
+
+def _said(result: Any) -> str:
+    """The verdict on all kinds, and what speaks against it."""
+    from jointscope.tools.verdicts.with_rests_judgement import judge_with_rests
+
+    judgement = judge_with_rests(result)
+    agree = judgement.checks[0]
+    return "\n".join([judgement.answer, *([f"  - {agree.text}"] if agree.level == "good" else [])])
+
+
+def _with_rests_json(result: Any) -> dict[str, Any]:
+    """A calibration from rests and other kinds for machines: rests have keys of their own."""
+    from jointscope.tools.verdicts.with_rests_judgement import judge_with_rests
+
+    rests, poses, frequency = result.rests.to_json(), result.poses, result.frequency
+    if poses is not None and frequency is not None:
+        others = kinds_json(result.others)
+    else:
+        others = pose_json(poses) if poses is not None else frequency.to_json()
+    own = ("iterations", "samples", "parameters", "undetermined", "repeatability", "converged", "cost", "wall_seconds")
+    return {
+        **others,
+        **{key: value for key, value in rests.items() if key not in own},
+        **judge_with_rests(result).to_json(),
+        "iterations": others["iterations"] + rests["iterations"],
+        "samples": others["samples"] + rests["samples"],
+        "parameters": others["parameters"] | rests["parameters"],
+        "agreement_with_rests": agreement_json(result.agreement),
+        "rest_repeatability": rests["repeatability"],
+        "cost": rests["cost"],
+        "wall_seconds": result.wall_seconds,
+    }
 
 
 def weighted_rests(robot: Robot, paths: Sequence[Path], progress: Progress) -> list[Any]:

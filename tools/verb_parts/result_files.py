@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 import argparse
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass
 from functools import partial
@@ -117,12 +117,30 @@ def write_comparison(result: Any, files: ResultFiles, checked: AcceptedBy = NO_L
     _write(result, files, partial(comparison_report, checked=checked), log_comparison, lambda: acceptance_json(checked))
 
 
-def write_diagnosis(result: Any, files: ResultFiles, checked: AcceptedBy = NO_LIMITS) -> None:
-    """Writes a Diagnosis, and which limits its model keeps."""
+def write_diagnosis(
+    result: Any,
+    files: ResultFiles,
+    checked: AcceptedBy = NO_LIMITS,
+    first: Sequence[Any] = (),
+    content: Mapping[str, Any] | None = None,
+) -> None:
+    """Writes a Diagnosis, and which limits its model keeps.
+
+    Args:
+        result: what was found.
+        files: where to.
+        checked: limits that the user has declared, as they came out.
+        first: sections of the report before all others.
+        content: of the JSON, in place of what is there or beside it.
+
+    Raises:
+        JointscopeError: a file cannot be written; then none is.
+    """
     from jointscope.tools.report import diagnosis_report
     from jointscope.tools.rerun_log import log_diagnosis
 
-    _write(result, files, partial(diagnosis_report, checked=checked), log_diagnosis, lambda: acceptance_json(checked))
+    report = partial(diagnosis_report, checked=checked, first=first)
+    _write(result, files, report, log_diagnosis, lambda: {**(content or {})} | acceptance_json(checked))
 
 
 def write_discovery(result: Any, files: ResultFiles, start: str) -> None:

@@ -21,7 +21,7 @@ from jointscope.tools.verb_parts.frequency_runs import (
     run_kinds_calibration,
 )
 from jointscope.tools.verb_parts.pose_runs import check_one_kind, run_pose_calibration, urdf_files
-from jointscope.tools.verb_parts.rest_runs import run_rest_calibration
+from jointscope.tools.verb_parts.rest_runs import run_calibration_with_rests, run_rest_calibration
 from jointscope.tools.verb_parts.result_files import ResultFiles, add_result_options, check_viewer
 from jointscope.tools.verb_parts.user_effects import add_effects_option, effects_words, load_user_effects
 from jointscope.tools.verb_parts.workers import add_spreading_option, check_one_choice, check_workers, workers_of
@@ -37,6 +37,7 @@ EXAMPLE = """example:
   jointscope calibrate tx90l --frequency frequency_P1 frequency_P3 -o arm.yaml --report arm.html
   jointscope calibrate tx90l --frequency frequency_P1 frequency_P3 --poses poses -o arm.yaml --report arm.html
   jointscope calibrate biorob train --rests spring1 spring2 gravity -o arm.yaml --report arm.html
+  jointscope calibrate arm.yaml --rests weights --poses poses -o arm_calibrated.yaml --report arm.html
   jointscope calibrate arm.yaml train --frequency frequency_P1 frequency_P3 --poses poses -o arm_calibrated.yaml
 
 Several bags share all parameters; each has its own states and gyro biases. The result is a robot file that every verb
@@ -139,6 +140,9 @@ def _still_kinds(
     """What calibrates from poses, frequency responses or rests alone; None where there is motion."""
     if args.bags:
         return None
+    if args.rests and (args.poses or args.frequency):
+        kinds = (args.rests, args.poses, args.frequency)
+        return partial(run_calibration_with_rests, robot, *kinds, files, args.urdf, limits)
     if args.poses and args.frequency:
         return partial(run_kinds_calibration, robot, args.frequency, args.poses, files, args.urdf, limits)
     if args.poses:

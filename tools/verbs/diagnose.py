@@ -11,6 +11,7 @@ from jointscope.tools.verb_parts.acceptance import add_accept_option, limits_of,
 from jointscope.tools.verb_parts.bag_arguments import add_bag_arguments, check_kind, input_files, read_bags
 from jointscope.tools.verb_parts.result_files import ResultFiles, add_result_options, check_viewer
 from jointscope.tools.verb_parts.searches.arm_search import run_arm_search
+from jointscope.tools.verb_parts.searches.kinds_search import run_kinds_diagnosis, several_graphs
 from jointscope.tools.verb_parts.searches.rest_search import run_rest_search
 from jointscope.tools.verb_parts.user_effects import load_user_effects
 from jointscope.tools.verb_parts.workers import add_workers_option, check_one_choice, check_workers, workers_of
@@ -21,6 +22,7 @@ EXAMPLE = """example:
   jointscope diagnose doggy train.mcap --holdout test.mcap --report diagnosis.html
   jointscope diagnose biorob --rests spring1 spring2 gravity --report diagnosis.html
   jointscope diagnose tx90l --frequency frequency_P1 frequency_P3 --poses poses.csv
+  jointscope diagnose arm.yaml train.mcap --poses poses.csv --rests weights --report diagnosis.html
 
 The robot is calibrated first. Effects are chosen on blocks of the training recordings that were left out; the held-out
 recording is only scored. `jointscope add` puts an effect into the robot file, `jointscope discover` repeats both."""
@@ -32,6 +34,10 @@ ARM_LIMITS = (
 REST_LIMITS = (
     "--accept: limits do not apply to a diagnosis of rests; `jointscope calibrate` and `jointscope compare` "
     "take them with --rests"
+)
+
+KINDS_LIMITS = (
+    "--accept: limits do not apply to a diagnosis of several kinds; `jointscope calibrate` takes them with all"
 )
 
 
@@ -56,6 +62,14 @@ def run(args: argparse.Namespace) -> int:
 
     robot = load_robot(args.robot)
     limits = limits_of(args, [robot])
+    if several_graphs(args):
+        if limits:
+            raise RobotError(KINDS_LIMITS)
+        check_viewer(robot, files)
+        with progress_bar() as progress, workers_of(args) as workers:
+            print(run_kinds_diagnosis(robot, args, files, workers, progress))
+        files.tell()
+        return 0
     if args.poses or args.frequency:
         if limits:
             raise RobotError(ARM_LIMITS)

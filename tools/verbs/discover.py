@@ -15,6 +15,7 @@ from jointscope.tools.terminal.progress import Progress, progress_bar
 from jointscope.tools.verb_parts.bag_arguments import add_bag_arguments, check_kind, input_files, read_bags
 from jointscope.tools.verb_parts.result_files import ResultFiles, add_result_options, check_viewer, write_discovery
 from jointscope.tools.verb_parts.searches.arm_search import run_arm_search
+from jointscope.tools.verb_parts.searches.kinds_search import must_be_searched_apart
 from jointscope.tools.verb_parts.searches.rest_search import run_rest_search
 from jointscope.tools.verb_parts.user_effects import load_user_effects
 from jointscope.tools.verb_parts.workers import add_workers_option, check_one_choice, check_workers, workers_of
@@ -56,6 +57,7 @@ def run(args: argparse.Namespace) -> int:
     files = ResultFiles.of(args)
     check_one_choice(args)
     check_kind(args)
+    must_be_searched_apart(args)
     beside = [state_file(args.output), *(step_file(args.output, k) for k in range(MOST_STEPS + 1))]
     check_outputs([*files.all, *beside], inputs=input_files(args))
     load_user_effects(args.effects)

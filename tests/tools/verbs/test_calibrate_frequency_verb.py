@@ -37,7 +37,6 @@ def test_other_kinds_and_options_of_motion_are_refused(bag, tmp_path, capsys):
     out = ["-o", tmp_path / "o.yaml"]
     assert "given as motion and as frequency responses" in refused(["tx90l", bag, OPTION, bag, *out], capsys)
     both = ["tx90l", OPTION, bag, "--poses", bag, *out]
-    assert "--rests and --poses go into one estimate where motion is there" in refused([*both, "--rests", bag], capsys)
     assert "leave it out with --poses" in refused([*both, "--incremental"], capsys)
     moving = refused(["tx90l", tmp_path / "moves.mcap", OPTION, bag, "--incremental", *out], capsys)
     assert "goes along motion alone, and --frequency has none; leave --incremental out" in moving

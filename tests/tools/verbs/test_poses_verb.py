@@ -220,7 +220,10 @@ def test_simulate_discover_and_diagnose_on_poses(tmp_path, monkeypatch, capsys):
             ["diagnose", "tx90l", "--frequency", "b.mcap", "--holdout-frequency", "b.mcap"],
             "b.mcap is given with --frequency and held out",
         ),
-        (["diagnose", "doggy", "a.mcap", "--frequency", "b.mcap"], "a search takes motion apart from --frequency"),
+        (
+            ["discover", "doggy", "a.mcap", "--frequency", "b.mcap", "-o", "a.yaml"],
+            "`discover` grows a model by motion, by rests, or by --poses and --frequency; `jointscope diagnose` takes",
+        ),
         (["diagnose", "tx90l", "--poses", "p.csv", "--holdout", "b.mcap"], "--holdout is for recordings of motion"),
         (
             ["discover", "doggy", "a.mcap", "--holdout-poses", "p.csv", "-o", "a.yaml"],

@@ -23,8 +23,6 @@ pytestmark = pytest.mark.skipif(not BIOROB.is_dir(), reason="shared/data/biorob 
 @pytest.mark.parametrize(
     ("options", "text"),
     [
-        ([SPRING1, "--rests", SPRING3], "a search takes --rests alone, not yet with recordings of motion"),
-        (["--rests", SPRING3, "--poses", "poses.csv"], "a search takes --rests alone, not yet with --poses"),
         (["--rests", SPRING1, "--holdout-rests", SPRING1], "is given with --rests and held out; leave it out once"),
         (["--holdout-rests", SPRING1], "--holdout-rests goes with --rests"),
         (
@@ -40,6 +38,14 @@ def test_what_does_not_go_together_is_refused_in_one_line(options, text, tmp_pat
     assert main(["diagnose", "biorob", *map(str, options)]) == 1
     said = capsys.readouterr().err
     assert text in said and len(said.strip().splitlines()) == 1
+
+
+@pytest.mark.parametrize("given", [[SPRING1, "--rests", SPRING3], ["--rests", SPRING3, "--poses", "poses.csv"]])
+def test_a_model_grows_by_one_graph_and_all_kinds_are_asked_by_diagnose(given, tmp_path, capsys):
+    assert main(["discover", "biorob", *map(str, given), "-o", str(tmp_path / "o.yaml")]) == 1
+    assert (
+        "`jointscope diagnose` takes all of them and says which kind shows what is missing" in capsys.readouterr().err
+    )
 
 
 def test_limits_go_with_calibrate_and_compare(tmp_path, capsys):

@@ -1,0 +1,67 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Verdicts of several kinds put together, by hand."""
+
+from __future__ import annotations
+
+import pytest
+
+from jointscope.graphs.across_kinds.said_by_kinds import Said, across_kinds, unseen_by_arm
+
+
+def said(verdict, size=1.0, sigma=0.1, alike=(), unit="N m"):
+    return Said(verdict, {"torque": (size, sigma, unit)}, tuple(alike))
+
+
+def verdicts(**kinds):
+    return {c.label: c for c in across_kinds(kinds)}
+
+
+@pytest.mark.parametrize(
+    ("motion", "rests", "verdict", "against"),
+    [
+        (said("missing"), said("missing", 1.1), "missing", ()),
+        (said("missing"), said("untestable"), "missing", ()),
+        (said("missing"), said("absent", 0.9, 0.5), "missing", ()),
+        (said("missing"), said("absent", 0.0), "possible", ("rests",)),
+        (said("missing"), said("missing", -1.0), "possible", ("motion", "rests")),
+        (said("missing", 1.0, 1e-6), said("missing", 1.2, 1e-6), "missing", ()),
+        (said("missing"), said("absent", 0.0, unit="rad"), "missing", ()),
+        (said("possible"), said("absent", 0.0), "absent", ("rests",)),
+        (said("possible"), said("absent", 1.0), "possible", ()),
+        (said("stand_in"), said("untestable"), "possible", ()),
+        (said("absent"), said("untestable"), "absent", ()),
+        (said("untestable"), said("untestable"), "untestable", ()),
+    ],
+)
+def test_what_two_kinds_say_is_one_verdict(motion, rests, verdict, against):
+    found = verdicts(motion={"a@j": motion}, rests={"a@j": rests})["a@j"]
+    assert found.verdict == verdict and found.against == against
+
+
+def test_look_alikes_stay_where_every_kind_that_shows_the_effect_has_them():
+    found = verdicts(
+        motion={"a@j": said("missing", alike=["b@j", "c@j"])}, poses={"a@j": said("missing", alike=["c@j", "d@j"])}
+    )["a@j"]
+    assert found.look_alikes == ("c@j",)
+    assert found.told_apart == {"motion": ("d@j",), "poses": ("b@j",)}
+
+
+def test_a_look_alike_that_another_kind_shows_explains_an_effect_that_it_could_show_and_does_not():
+    rests = {"a@j": said("missing", alike=["b@j"]), "b@j": said("possible", alike=["a@j"])}
+    found = verdicts(motion={"b@j": said("missing"), "a@j": said("possible")}, rests=rests)
+    assert found["b@j"].verdict == "missing" and found["b@j"].explained_by == ""
+    assert found["a@j"].verdict == "possible" and found["a@j"].explained_by == "b@j"
+    found = verdicts(motion={"b@j": said("missing"), "a@j": said("untestable")}, rests=rests)
+    assert found["a@j"].verdict == "missing"
+
+
+def test_effects_that_more_kinds_show_come_first():
+    one = {"a@j": said("missing"), "b@j": said("missing"), "c@j": said("absent")}
+    found = across_kinds({"motion": one, "rests": {"b@j": said("missing"), "d@j": said("possible")}})
+    assert [c.label for c in found] == ["b@j", "a@j", "d@j", "c@j"]
+
+
+def test_effects_of_motion_that_do_nothing_in_poses_are_untestable_by_them():
+    found = unseen_by_arm(["torque_delay@robot", "payload@robot", "cogging@j"], ["poses", "frequency"])
+    assert set(found) == {"poses"} and set(found["poses"]) == {"torque_delay@robot"}
+    assert found["poses"]["torque_delay@robot"].why == "nothing moves at rest"
