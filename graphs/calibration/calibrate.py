@@ -16,14 +16,13 @@ from numpy.typing import NDArray
 
 from jointscope.factors.calibration import DYNAMICS, Calibration, rotation_block
 from jointscope.graphs.calibration.calibration_result import CalibrationResult
-from jointscope.graphs.calibration.calibration_summary import Solved, summarize
+from jointscope.graphs.calibration.calibration_summary import summarize
 from jointscope.graphs.calibration.encoder_filters import (
     free_filters,
     lacking_filter,
     solved_with_filters,
     with_filters,
 )
-from jointscope.graphs.calibration.encoder_noise import with_visible_noise
 from jointscope.graphs.calibration.failures_with_notices import names_notices
 from jointscope.graphs.calibration.friction_at_standstill import (
     asked_at_standstill,
@@ -31,9 +30,12 @@ from jointscope.graphs.calibration.friction_at_standstill import (
     sticking_joints,
     with_standstills,
 )
-from jointscope.graphs.calibration.solved_windows import anchored, tested_on_windows
+from jointscope.graphs.calibration.stages.encoder_noise import with_visible_noise
+from jointscope.graphs.calibration.stages.history import History
+from jointscope.graphs.calibration.stages.solved import Solved
+from jointscope.graphs.calibration.stages.solved_windows import anchored, tested_on_windows
+from jointscope.graphs.calibration.stages.whole_stage import LOOSE, WholeStage, blunt_sharpness, blunted
 from jointscope.graphs.calibration.turned_mounting import held, released, turned_without_reason
-from jointscope.graphs.calibration.whole_stage import LOOSE, History, WholeStage, blunt_sharpness, blunted
 from jointscope.graphs.gtsam_solvers.samples_solver import must_be_short, solve_samples
 from jointscope.graphs.noise.lasting_noise import without_lasting
 from jointscope.graphs.noise.noise_estimation import estimate_noise, not_below

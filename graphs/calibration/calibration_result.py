@@ -12,6 +12,8 @@ from numpy.typing import NDArray
 
 from jointscope.factors.calibration import Calibration
 from jointscope.graphs.calibration.external_torque import ExternalTorque
+from jointscope.graphs.calibration.stages.history import IterationRecord
+from jointscope.graphs.calibration.stages.residual_series import ResidualSeries
 from jointscope.graphs.scoring.drive_timing import DriveTiming
 from jointscope.graphs.scoring.lacking_effects import LackingEffect
 from jointscope.graphs.scoring.regression.asked_by_regression import Asked
@@ -93,28 +95,6 @@ class ChannelFit:
 
 
 @dataclass(frozen=True)
-class ResidualSeries:
-    """Measured and predicted values of one sensor over time (predicted from the smoothed states).
-
-    Attributes:
-        channels: names of the columns.
-        units: SI unit of each.
-        times: shape (m,) [s].
-        measured, predicted: shape (m, c) [unit]; the latter NaN where a sample is not about that channel.
-        sigma: expected standard deviation of measured - predicted, shape (m, c) [unit].
-        chi2: mean square of residual over sigma, corrected for the freedom of the states, shape (c,).
-    """
-
-    channels: tuple[str, ...]
-    units: tuple[str, ...]
-    times: Array
-    measured: Array
-    predicted: Array
-    sigma: Array
-    chi2: Array = field(default_factory=lambda: np.ones(0))
-
-
-@dataclass(frozen=True)
 class BagFit:
     """States and residuals of one recording.
 
@@ -141,16 +121,6 @@ class BagFit:
     process: Array
     process_sigma: Array
     isolated: tuple[ExternalTorque, ...] = ()
-
-
-@dataclass(frozen=True)
-class IterationRecord:
-    """One iteration for the convergence plot: stage ("windows", "whole"), cost, damping, largest step [sigma]."""
-
-    stage: str
-    cost: float
-    damping: float
-    step_in_sigmas: float
 
 
 @dataclass(frozen=True)

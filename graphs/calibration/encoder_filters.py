@@ -16,9 +16,9 @@ import numpy as np
 from scipy.special import chdtrc
 
 from jointscope.factors.calibration import Calibration
-from jointscope.graphs.calibration.calibration_summary import Solved
-from jointscope.graphs.calibration.solved_windows import anchored
-from jointscope.graphs.calibration.whole_stage import WholeStage
+from jointscope.graphs.calibration.stages.solved import Solved
+from jointscope.graphs.calibration.stages.solved_windows import anchored
+from jointscope.graphs.calibration.stages.whole_stage import WholeStage
 from jointscope.graphs.noise.unlikelihood import unlikelihood
 from jointscope.graphs.problem.bag_problem import BagProblem
 from jointscope.graphs.scoring.lacking_effects import LackingEffect

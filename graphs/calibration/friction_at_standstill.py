@@ -17,10 +17,10 @@ from dataclasses import replace
 import numpy as np
 
 from jointscope.factors.calibration import DYNAMICS, Calibration, rotation_block
-from jointscope.graphs.calibration.calibration_summary import Solved
-from jointscope.graphs.calibration.solved_windows import anchored
 from jointscope.graphs.calibration.stages.convergence_asked import must_converge
-from jointscope.graphs.calibration.whole_stage import (
+from jointscope.graphs.calibration.stages.solved import Solved
+from jointscope.graphs.calibration.stages.solved_windows import anchored
+from jointscope.graphs.calibration.stages.whole_stage import (
     BELOW_ITERATIONS,
     FEW_ITERATIONS,
     MOST_ITERATIONS,

@@ -17,7 +17,7 @@ from jointscope.factors.calibration import DYNAMICS, Calibration, rotation_block
 from jointscope.graphs.calibration.base_model import with_full_gyros
 from jointscope.graphs.calibration.calibrate import calibrate, check_recordings
 from jointscope.graphs.calibration.external_torque import external_torques_of
-from jointscope.graphs.calibration.whole_stage import approach
+from jointscope.graphs.calibration.stages.whole_stage import approach
 from jointscope.graphs.comparison.causal_filter import filter_states
 from jointscope.graphs.comparison.comparison_result import (
     ChannelComparison,

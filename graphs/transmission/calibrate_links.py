@@ -12,17 +12,13 @@ from numpy.typing import NDArray
 
 from jointscope.factors.calibration import Calibration
 from jointscope.graphs.calibration.calibrate import check_recordings
-from jointscope.graphs.calibration.calibration_result import (
-    BagFit,
-    CalibrationResult,
-    ChannelFit,
-    IterationRecord,
-    ResidualSeries,
-)
+from jointscope.graphs.calibration.calibration_result import BagFit, CalibrationResult, ChannelFit
 from jointscope.graphs.calibration.calibration_summary import calibrated_robot, parameter_table, shared_names
 from jointscope.graphs.calibration.failures_with_notices import names_notices
 from jointscope.graphs.calibration.findings import findings
 from jointscope.graphs.calibration.identifiability import weak_directions
+from jointscope.graphs.calibration.stages.history import IterationRecord
+from jointscope.graphs.calibration.stages.residual_series import ResidualSeries
 from jointscope.graphs.noise.robust_sigma import FEWEST_BLOCKS, BlockScores, inflation
 from jointscope.graphs.solving.batch_solver import Progress, Solution, solve
 from jointscope.graphs.solving.estimate import Estimate

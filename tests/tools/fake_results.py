@@ -12,11 +12,11 @@ from jointscope.graphs.calibration.calibration_result import (
     BagFit,
     CalibrationResult,
     ChannelFit,
-    IterationRecord,
     ParameterEstimate,
-    ResidualSeries,
     WeakDirection,
 )
+from jointscope.graphs.calibration.stages.history import IterationRecord
+from jointscope.graphs.calibration.stages.residual_series import ResidualSeries
 from jointscope.graphs.comparison.comparison_result import (
     ChannelComparison,
     ComparisonResult,

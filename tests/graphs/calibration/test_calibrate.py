@@ -183,7 +183,7 @@ def test_joint_that_never_moves_is_an_error_that_names_its_parameters(simulated,
 
 @pytest.mark.slow
 def test_no_convergence_is_an_error_and_not_a_result(simulated, doggy, monkeypatch):
-    monkeypatch.setattr("jointscope.graphs.calibration.whole_stage.MOST_ITERATIONS", 1)
+    monkeypatch.setattr("jointscope.graphs.calibration.stages.whole_stage.MOST_ITERATIONS", 1)
     with pytest.raises(SolveError, match="no convergence after 1 iterations: the last step was still"):
         calibrate(doggy, [simulated.recording])
 

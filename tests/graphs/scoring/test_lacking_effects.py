@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 from simulated_arm import Arm, assert_right, moved, robot_file
 
-from jointscope.graphs.calibration import solved_windows
 from jointscope.graphs.calibration.calibrate import calibrate
+from jointscope.graphs.calibration.stages import solved_windows
 from jointscope.graphs.scoring.regression.asked_by_regression import Asked
 from jointscope.robots.files.effect_editing import add_effect
 from jointscope.robots.files.robot_file import load_robot

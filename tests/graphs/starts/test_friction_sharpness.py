@@ -10,7 +10,7 @@ import pytest
 from simulated_arm import SHARP, STEP, Arm, moved, written
 
 from jointscope.graphs.calibration.calibrate import calibrate
-from jointscope.graphs.calibration.whole_stage import blunted
+from jointscope.graphs.calibration.stages.whole_stage import blunted
 from jointscope.graphs.problem.bag_problem import BagProblem
 from jointscope.robots.bodies.rigid_tree import RigidTree
 from jointscope.robots.dynamics.elastic_joints import ElasticJoints

@@ -7,7 +7,8 @@ from html import escape
 
 import numpy as np
 
-from jointscope.graphs.calibration.calibration_result import BagFit, CalibrationResult, ResidualSeries
+from jointscope.graphs.calibration.calibration_result import BagFit, CalibrationResult
+from jointscope.graphs.calibration.stages.residual_series import ResidualSeries
 from jointscope.tools.presentation.numbers import percent, prefixed, significant
 from jointscope.tools.presentation.sensor_signals import COLOURS, points_per_curve
 from jointscope.tools.report.page.page import Section, figure, table

@@ -7,7 +7,7 @@ from html import escape
 
 import numpy as np
 
-from jointscope.graphs.calibration.calibration_result import ResidualSeries
+from jointscope.graphs.calibration.stages.residual_series import ResidualSeries
 from jointscope.graphs.fixed_lag.replay.replay_result import InnovationSeries, ReplayResult
 from jointscope.tools.presentation.numbers import prefixed, significant
 from jointscope.tools.report.page.page import Section, figure, table

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from jointscope.factors.calibration import Calibration
-from jointscope.graphs.calibration.calibration_summary import Solved
+from jointscope.graphs.calibration.stages.solved import Solved
 from jointscope.graphs.noise.lasting_noise import NoiseWindows, states_in
 from jointscope.graphs.noise.torque_memory import memory_windows
 from jointscope.graphs.problem.bag_problem import BagProblem

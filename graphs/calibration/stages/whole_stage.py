@@ -15,10 +15,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from jointscope.factors.calibration import Calibration
-from jointscope.graphs.calibration.calibration_result import IterationRecord
-from jointscope.graphs.calibration.calibration_summary import Solved
-from jointscope.graphs.calibration.solved_windows import anchored, noise_windows
 from jointscope.graphs.calibration.stages.convergence_asked import must_converge
+from jointscope.graphs.calibration.stages.history import History
+from jointscope.graphs.calibration.stages.solved import Solved
+from jointscope.graphs.calibration.stages.solved_windows import anchored, noise_windows
 from jointscope.graphs.noise.noise_estimation import FixedPoint, densities, not_below, scaled
 from jointscope.graphs.noise.torque_memory import likeliest_memory
 from jointscope.graphs.problem.bag_problem import BagProblem
@@ -51,17 +51,6 @@ BELOW_ITERATIONS = 25  # where it does not come to rest in as many, the larger n
 BELOW = 10.0  # times smaller process noise that is tried
 BETTER = 1.5  # times smaller, the one that is preferred ...
 AS_GOOD = 0.02  # ... where the cost rises by less than this per measured value
-
-
-@dataclass
-class History:
-    """Iterations of all stages."""
-
-    records: list[IterationRecord] = field(default_factory=list)
-
-    def add(self, stage: str, solution: Solution) -> None:
-        """Takes in the iterations of one solve."""
-        self.records += [IterationRecord(stage, i.cost_after, i.damping, i.step_in_sigmas) for i in solution.iterations]
 
 
 @dataclass(frozen=True)

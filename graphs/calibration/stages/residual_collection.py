@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from jointscope.factors.dynamics import DynamicsFactor
-from jointscope.graphs.calibration.calibration_result import ResidualSeries
+from jointscope.graphs.calibration.stages.residual_series import ResidualSeries
 from jointscope.graphs.noise.noise_estimation import NoiseEvidence
 from jointscope.graphs.noise.robust_sigma import BlockScores
 from jointscope.graphs.problem.bag_problem import BagProblem

@@ -17,7 +17,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from jointscope.graphs.calibration.calibration_result import ResidualSeries
+from jointscope.graphs.calibration.stages.residual_series import ResidualSeries
 from jointscope.graphs.problem.coarse_encoder import COARSE, encoder_steps
 from jointscope.robots.model.robot import Robot
 from jointscope.robots.parts.sensors import LinkEncoder, MotorEncoder
