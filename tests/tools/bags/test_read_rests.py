@@ -10,36 +10,112 @@ import pytest
 
 from jointscope.robots.errors import RecordingError
 from jointscope.robots.files.robot_file import load_robot
-from jointscope.tools.bags.at_poses.read_rests import check_loads
+from jointscope.tools.bags.at_poses.load_table import check_loads
+from jointscope.tools.bags.at_poses.read_rests import read_rests
+from jointscope.tools.bags.read_recording import read_recording
+from jointscope.tools.bags.write_bag import write_bag
 
 ROBOT = load_robot("biorob")
-NOTHING = np.zeros((1, 3))
+DATA = Path(__file__).resolve().parents[4] / "shared" / "data" / "biorob"
+needs_biorob = pytest.mark.skipif(not DATA.is_dir(), reason="shared/data/biorob is not beside the project")
 
 
-def refused(forces, torques, link):
+def refused(forces, link):
     with pytest.raises(RecordingError) as err:
-        check_loads(Path("bench"), ROBOT, np.atleast_2d(forces), np.atleast_2d(torques), [link])
+        check_loads("bench: topic /load", ROBOT, np.atleast_2d(forces), [link], "header.frame_id")
     return str(err.value)
 
 
 def test_a_force_on_a_link_is_fine():
-    check_loads(Path("bench"), ROBOT, np.array([[0.0, 3.0, -2.0]]), NOTHING, ["attachment"])
+    check_loads("bench", ROBOT, np.array([[0.0, 3.0, -2.0]]), ["attachment"], "column link")
 
 
 def test_a_frame_that_is_not_in_the_urdf_is_answered_with_the_right_one():
-    assert refused([0.0, 1.0, 0.0], NOTHING, "atachment") == (
+    assert refused([0.0, 1.0, 0.0], "atachment") == (
         "bench: topic /load: no link 'atachment' in biorob.urdf; did you mean 'attachment'?; header.frame_id names the "
         "link at whose origin the force acts"
     )
 
 
 def test_grams_are_no_newtons():
-    assert refused([0.0, 0.0, -1500.0], NOTHING, "attachment") == (
+    assert refused([0.0, 0.0, -1500.0], "attachment") == (
         "bench: topic /load: a force of 1500 N on a robot that weighs 23.8 N; expected newton: kilograms times 9.81, "
         "grams times 0.00981"
     )
 
 
-def test_torques_and_what_is_no_number_are_refused():
-    assert "torques of up to 2 N m; expected forces alone" in refused(NOTHING, [0.0, 2.0, 0.0], "attachment")
-    assert "a force is no number; remove these messages" in refused([np.nan, 0.0, 0.0], NOTHING, "attachment")
+def test_what_is_no_number_is_refused():
+    assert "a force is no number; remove these messages" in refused([np.nan, 0.0, 0.0], "attachment")
+
+
+@pytest.fixture(scope="module")
+def bench(tmp_path_factory):
+    """A bag without /load, whose weights somebody wrote down, and its recording."""
+    told, bag = DATA / "static_gravity" / "gravity", tmp_path_factory.mktemp("bench") / "bench.mcap"
+    write_bag(bag, read_recording(told, ROBOT), ROBOT)
+    return bag, read_recording(bag, ROBOT)
+
+
+def written(bench, *lines):
+    bag = bench[0]
+    bag.with_name("bench.loads.csv").write_text("\n".join(lines) + "\n")
+    return read_rests(bag, ROBOT)
+
+
+def refusal(bench, *lines):
+    with pytest.raises(RecordingError) as err:
+        written(bench, *lines)
+    return str(err.value).split("bench.loads.csv: ", 1)[1]
+
+
+@needs_biorob
+def test_rows_hold_until_the_next(bench):
+    rests = written(bench, "time,link,mass", "0,,0", "60,attachment,0.5", "120,attachment,0.0")
+    begin = rests.times[:, 0]
+    assert {*rests.links} == {"", "attachment"}
+    for force, link, t in zip(rests.forces, rests.links, begin, strict=True):
+        hangs = 60.0 <= t < 120.0
+        assert link == ("attachment" if hangs else "")
+        np.testing.assert_allclose(force, [0.0, 0.0, -0.5 * 9.81 * hangs], atol=1e-12)
+    assert any("bench.loads.csv" in notice.text for notice in rests.notices)
+
+
+@needs_biorob
+def test_stamps_and_forces_are_understood(bench):
+    start = bench[1].start_ns / 1e9
+    rests = written(bench, "time,link,fx,fy,fz", f"{start + 60:.6f},attachment,1.5,-2,0")
+    late = rests.times[:, 0] > 60.5
+    np.testing.assert_allclose(rests.forces[late], [[1.5, -2.0, 0.0]] * int(late.sum()))
+    assert not np.any(rests.forces[rests.times[:, 1] < 59.0])
+
+
+@needs_biorob
+@pytest.mark.parametrize(
+    ("lines", "said"),
+    [
+        (("time,link", "0,attachment"), "no column 'fx'; expected time, link, and mass [kg] or fx, fy, fz [N]"),
+        (("t,link,mass", "0,attachment,1"), "no column 'time'; "),
+        (
+            ("time,link,mass", "0,atachment,1"),
+            "no link 'atachment' in biorob.urdf; did you mean 'attachment'?; column link names the",
+        ),
+        (("time,link,mass", "0,,1"), "line 2, column link: expected the link that the load hangs on"),
+        (("time,link,mass", "0,attachment,500"), "line 2, column mass: 500 kg on a robot of 2.43 kg; expected"),
+        (("time,link,mass", "0,attachment,-1"), "line 2, column mass: expected kilograms, got -1"),
+        (("time,link,mass", "0,attachment,heavy"), "line 2, column mass: expected a number, got 'heavy'"),
+        (("time,link,mass", "5e5,attachment,1"), "line 2: a load at 500000 s, but the recording lasts from 0 to"),
+        (("time,link,mass", "1,attachment,1", "1,attachment,2"), "two loads at 1 s; one holds until the next"),
+        (("time,link,mass",), "expected a line with the names of the columns and one per load, got 1 lines"),
+    ],
+)
+def test_what_a_table_lacks_is_told(bench, lines, said):
+    assert refusal(bench, *lines).startswith(said)
+
+
+@needs_biorob
+def test_a_table_beside_a_bag_with_loads_is_one_too_many(tmp_path):
+    bag = tmp_path / "spring1"
+    bag.symlink_to(DATA / "static_spring" / "spring1", target_is_directory=True)
+    (tmp_path / "spring1.loads.csv").write_text("time,link,mass\n0,attachment,1\n")
+    with pytest.raises(RecordingError, match=r"has the topic /load, and .*spring1\.loads\.csv says loads, too"):
+        read_rests(bag, ROBOT)

@@ -8,7 +8,6 @@ distance share.
 
 from __future__ import annotations
 
-import csv
 import hashlib
 from collections import Counter
 from collections.abc import Sequence
@@ -24,6 +23,7 @@ from jointscope.robots.model.robot import Robot
 from jointscope.robots.recordings.poses import Poses, Sighting
 from jointscope.robots.recordings.recording import Notice
 from jointscope.robots.units import si_factor
+from jointscope.tools.bags.at_poses.table import Table
 from jointscope.tools.bags.at_poses.target_rows import QUATERNION, by_pose, orientations, quaternions, target_names
 
 Array = NDArray[np.float64]
@@ -38,36 +38,26 @@ def poses_from_table(path: Path, robot: Robot) -> Poses:
     """
     setup = robot.poses
     assert setup is not None
-    text = _text(path)
-    rows = list(csv.reader(text.splitlines()))
-    if len(rows) < 2:
-        raise RecordingError(
-            f"{path}: expected a line with the names of the columns and one per pose, got {len(rows)} lines"
-        )
-    head, body = [cell.strip() for cell in rows[0]], [row for row in rows[1:] if any(cell.strip() for cell in row)]
-    wrong = next((i for i, row in enumerate(body) if len(row) != len(head)), None)
-    if wrong is not None:
-        raise RecordingError(f"{path}: line {wrong + 2} has {len(body[wrong])} cells, the first line {len(head)}")
+    table = Table.read(path, "pose")
+    head, body = table.head, table.body
     joints = [_joint_column(path, head, joint, i) for i, joint in enumerate(robot.joints)]
     if len(set(joints)) < len(joints):
         raise RecordingError(
             f"{path}: two joints would have the same column; name the columns {', '.join(robot.joints)}"
         )
-    q = _numbers(path, body, head, joints) * setup.joint_states.factor
+    q = table.numbers(joints) * setup.joint_states.factor
     torques = [_torque_column(head, joint, i) for i, joint in enumerate(robot.joints)]
-    tau = None if None in torques else _numbers(path, body, head, [t for t in torques if t is not None])
-    names = (
-        tuple(row[head.index("pose")].strip() for row in body) if "pose" in head else tuple(map(str, range(len(body))))
-    )
-    digest = hashlib.sha256(text.encode()).hexdigest()
+    tau = None if None in torques else table.numbers([t for t in torques if t is not None])
+    names = tuple(table.words("pose")) if "pose" in head else tuple(map(str, range(len(body))))
+    digest = hashlib.sha256(table.text.encode()).hexdigest()
     if "contact" in head:
-        contacts = tuple(row[head.index("contact")].strip() for row in body)
+        contacts = tuple(table.words("contact"))
         if "" in contacts:
             raise RecordingError(
                 f"{path}: line {contacts.index('') + 2}, column contact: expected the name of the contact that "
                 "holds the target, got nothing; name it, or remove the pose"
             )
-        places = tuple(row[head.index("place")].strip() for row in body) if "place" in head else contacts
+        places = tuple(table.words("place")) if "place" in head else contacts
         pairs = tuple(dict.fromkeys(zip(contacts, places, strict=True)))
         unused = () if setup.contact_distance is None else _unused_distance(path, pairs)
         notices = (*_same_names(path, names), *unused)
@@ -79,7 +69,7 @@ def poses_from_table(path: Path, robot: Robot) -> Poses:
             f"{path}: no column {missing[0]!r}; expected x, y, z of the target, or `contact`; there are "
             f"{', '.join(head)}"
         )
-    target = _numbers(path, body, head, [head.index(axis) for axis in AXES]) * si_factor(setup.positions.unit)
+    target = table.numbers([head.index(axis) for axis in AXES]) * si_factor(setup.positions.unit)
     _must_differ(path, np.hstack([q, target]))
     found = Poses(str(path), digest, names, q, target, torque=tau)
     return _with_targets(path, found, head, body, robot)
@@ -142,15 +132,6 @@ def _unused_distance(path: Path, pairs: Sequence[tuple[str, str]]) -> tuple[Noti
     return (Notice("poses", "info", len(pairs), text),)
 
 
-def _text(path: Path) -> str:
-    try:
-        return path.read_text(encoding="utf-8-sig")
-    except OSError as err:
-        raise RecordingError(f"cannot read {path}: {err.strerror or err}") from err
-    except UnicodeDecodeError as err:
-        raise RecordingError(f"{path} is no table: it is not text") from err
-
-
 def _joint_column(path: Path, head: Sequence[str], joint: str, place: int) -> int:
     """The column of a joint: by its name, by a name that ends it, or by its number."""
     for name in (joint, f"q{place + 1}"):
@@ -164,24 +145,6 @@ def _joint_column(path: Path, head: Sequence[str], joint: str, place: int) -> in
 
 def _torque_column(head: Sequence[str], joint: str, place: int) -> int | None:
     return next((head.index(n) for n in (f"{joint}.torque", f"tau{place + 1}") if n in head), None)
-
-
-def _numbers(path: Path, body: Sequence[Sequence[str]], head: Sequence[str], columns: Sequence[int]) -> Array:
-    found = np.empty((len(body), len(columns)))
-    for i, row in enumerate(body):
-        for k, column in enumerate(columns):
-            try:
-                found[i, k] = float(row[column])
-            except ValueError:
-                raise RecordingError(
-                    f"{path}: line {i + 2}, column {head[column]}: expected a number, got {row[column]!r}"
-                ) from None
-    if not np.all(np.isfinite(found)):
-        i, k = np.argwhere(~np.isfinite(found))[0]
-        raise RecordingError(
-            f"{path}: line {i + 2}, column {head[columns[k]]}: expected a finite number, got {found[i, k]}"
-        )
-    return found
 
 
 def pose_table(poses: Poses, robot: Robot) -> str:
