@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from jointscope.robots.files.robot_writer import robot_text
     from jointscope.tools.bags.read_recording import read_recording
     from jointscope.tools.notebook.calls import calibrate, compare, diagnose, discover, graph
+    from jointscope.tools.notebook.linear_model import linear_model
     from jointscope.tools.notebook.models import add, export, info, remove
     from jointscope.tools.notebook.recordings import read, replay, simulate
 
@@ -35,6 +36,7 @@ __all__ = [
     "export",
     "graph",
     "info",
+    "linear_model",
     "load_robot",
     "read",
     "read_recording",
@@ -51,6 +53,7 @@ _MODULES = {
     "CalibrationGraph": "graphs.calibration.calibration_graph",
     "FixedLagEstimator": "graphs.fixed_lag.estimator",
     "JointscopeError": "robots.errors",
+    "linear_model": "tools.notebook.linear_model",
     "load_robot": "robots.files.robot_file",
     "read_recording": "tools.bags.read_recording",  # the older name of `read`, with its own arguments
     "robot_text": "robots.files.robot_writer",
