@@ -97,7 +97,9 @@ def _told(
     for solved in stage.passes(telling, noise, estimate, BELOW_ITERATIONS):
         if not _turns_over_in_sight(solved.problems, solved.solution.estimate.calibrations[0], asked):
             return None
-    return stage.from_both_sides(solved) if _takes_no_more_noise(stage, problems, solved) else None
+    if not _takes_no_more_noise(stage, problems, solved):
+        return None
+    return stage.with_short_impacts(stage.from_both_sides(solved))
 
 
 def _telling(problems: Sequence[BagProblem], asked: Sequence[str]) -> list[BagProblem]:

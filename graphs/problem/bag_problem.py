@@ -91,8 +91,11 @@ class BagProblem:
         weights = _impulse_weights(robot, recording, timeline)
         path = CommandPath(timeline.ticks, timeline.u, robot.effects, robot.joints, not robot.command_held)
         index = np.arange(len(timeline.h))
-        acting, holds = path if path.changes or path.runs_on else None, holding_motors(robot, recording, timeline.h)
-        free, slides = _free(robot, recording, timeline, holds), _sliding(robot, timeline, holds)
+        acting = path if path.changes or path.runs_on else None
+        # steps that were divided elsewhere leave those as they are at which a motor stands
+        whole = timeline.h if between is None else Timeline.of(recording, robot.command_held).h
+        holds = holding_motors(robot, recording, whole)
+        free, slides = _free(robot, recording, timeline, holds), _sliding(robot, timeline, holds, whole)
         steps = Steps(timeline.h, timeline.u, robot.noise, robot.layout, weights, acting, index, free, slides)
         dynamics = INTEGRATORS[robot.choices.integrator](ElasticJoints(robot), steps, robot.joints)
         rests = starts_at_rest(robot, recording)
@@ -225,14 +228,15 @@ def _free(robot: Robot, recording: Recording, timeline: Timeline, holds: Mapping
     return free
 
 
-def _sliding(robot: Robot, timeline: Timeline, holds: Mapping[str, Stretches]) -> Array | None:
+def _sliding(robot: Robot, timeline: Timeline, holds: Mapping[str, Stretches], whole: Array) -> Array | None:
     """How sharply friction turns over at both ends of each step, shape (m, 2, n), see `Steps`; None for its own law.
 
-    Where a motor stands, as sharply as may be integrated: it is braked, its friction is what it may be.
+    Where a motor stands, as sharply as may be integrated over steps that are not divided, whose lengths are `whole`: it
+    is braked, its friction is what it may be.
     """
     if not holds:
         return None
-    ticks, h = np.ones((len(timeline.ticks), robot.n)), float(np.median(timeline.h))
+    ticks, h = np.ones((len(timeline.ticks), robot.n)), float(np.median(whole))
     for joint, stretches in holds.items():
         gentle = 1.0 / stiffness(robot, joint, h)
         for t0, t1 in stretches:

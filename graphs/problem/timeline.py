@@ -19,6 +19,7 @@ from jointscope.robots.recordings.recording import Recording, Stream
 Array = NDArray[np.float64]
 
 LONGEST_STEP = 2.5e-3  # [s] friction changes sign within a few milliseconds
+SAME = 2e-6  # [s] nearer times are one: no noise holds two states that are a rounding error apart
 SHORTEST_STEP = 2e-5  # [s] below this two commands are one; the later one counts
 ALIKE = 1.5  # times its neighbours: a longer interval is a gap, over which no slope beside it tells anything
 MOST_TICKS, MOST_PER_SAMPLE = 20_000, 100  # states that no sample tells anything of take memory and time
@@ -49,7 +50,7 @@ class Timeline:
         Args:
             recording: with its drive signal.
             held: whether each value of it acts until the next one; otherwise it runs smoothly through its samples.
-            between: times at which steps are divided further [s]; those outside do nothing.
+            between: times at which steps are divided further [s]; those outside, and at ticks, do nothing.
 
         Raises:
             RecordingError: commands and sensors do not overlap in time.
@@ -77,7 +78,10 @@ class Timeline:
         fraction = np.concatenate([np.arange(p) / p for p in parts])
         ticks = np.append(np.repeat(edges[:-1], parts) + fraction * np.repeat(np.diff(edges), parts), edges[-1])
         if between is not None:
-            ticks = np.union1d(ticks, between[(between > ticks[0]) & (between < ticks[-1])])
+            inside = between[(between > ticks[0]) & (between < ticks[-1])]
+            after = np.searchsorted(ticks, inside)
+            far = np.minimum(inside - ticks[after - 1], ticks[after] - inside) > SAME
+            ticks = np.union1d(ticks, inside[far])
         # a tick that divides a step may be a rounding error away from its beginning, never beyond its end
         step = np.clip(np.searchsorted(edges, ticks[:-1] + 0.5 * np.diff(ticks)) - 1, 0, len(u) - 1)
         return Timeline(ticks, u[step] if held else _means(command, ticks))

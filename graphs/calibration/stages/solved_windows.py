@@ -27,6 +27,7 @@ Array = NDArray[np.float64]
 LONG = 25.0  # [s] of recordings, from which some windows are asked before all samples are
 SHARE = 1.0 / 3.0  # of the recordings in those windows
 LENGTH = 2.4  # [s] of one
+MOVING = 0.5  # of the mean squared speed of each joint in the recordings, that windows must have to speak for them
 
 
 @dataclass(frozen=True)
@@ -72,16 +73,28 @@ def noise_windows(solved: Solved) -> NoiseWindows:
 
 
 def tested_on_windows(solved: Solved) -> ScoreTest | None:
-    """A score test on a part of long recordings, spread evenly; None where all samples are asked at once."""
+    """A score test on a part of long recordings, spread evenly; None where all samples are asked at once.
+
+    So they are where a joint moves elsewhere than in the windows: an effect that is not seen there is not ruled out.
+    """
     recordings = [p.recording for p in solved.problems]
     seconds = sum(float(np.ptp(p.timeline.ticks)) for p in solved.problems)
     if seconds < LONG:
         return None
     try:
         cut = SolvedWindows.of(solved, windows_of(recordings, SHARE * seconds, LENGTH))
-        return ScoreTest.of(cut.on(cut.robot), cut.states, cut.calibrations)
+        windows, (whole, states, _) = cut.on(cut.robot), solved.of_motions
+        if np.any(_squared_speeds(windows, cut.states) < MOVING * _squared_speeds(whole, states)):
+            return None
+        return ScoreTest.of(windows, cut.states, cut.calibrations)
     except SolveError:
         return None
+
+
+def _squared_speeds(problems: Sequence[BagProblem], states: Sequence[Array]) -> Array:
+    """Mean squared speed of each coordinate over all recordings, shape (k,)."""
+    h, v = np.concatenate([p.timeline.h for p in problems]), problems[0].robot.layout.velocities
+    return np.asarray(np.average(np.vstack([x[:-1, v] for x in states]) ** 2, axis=0, weights=h))
 
 
 def anchored(problems: Sequence[BagProblem], calibrations: Sequence[Calibration]) -> list[BagProblem]:

@@ -12,6 +12,8 @@ from jointscope.tools.simulator.simulation import simulate
 
 pytest.importorskip("mujoco", reason="the arm is moved by MuJoCo, which the extra `sim` brings")
 
+JOINTS = ("joint1", "joint2", "joint3", "joint4")
+
 
 @pytest.fixture(scope="module")
 def robot():
@@ -61,3 +63,18 @@ def test_only_steps_over_an_edge_are_divided_and_the_recording_stays_divided(rob
     np.testing.assert_array_equal(short.of_robot(robot).timeline.ticks, short.timeline.ticks)
     wider = {"joint4.spring_slack.forward": 0.3}
     assert problem.divided(x, wider)[0] is problem
+
+
+def test_motors_stand_where_they_did_however_many_steps_are_divided(robot):
+    light = {f"{joint}.coulomb_torque": 0.3 * robot.drive_parameter(joint, "coulomb_torque").value for joint in JOINTS}
+    problem = BagProblem.of(robot.with_values(light), simulate(load_robot("biorob"), "moves", 1.0, seed=1).recording)
+    count = len(problem.timeline.ticks)
+    x = deflected(robot, np.where(np.arange(count) < count // 2, 0.02, 0.2 * (np.arange(count) % 2)))
+    short, _ = problem.divided(x, {})
+    assert np.median(short.timeline.h) < 0.2 * np.median(problem.timeline.h)
+    ticks = np.arange(count)
+    stands = problem.motor_stands(ticks)
+    assert stands.any()
+    of_same = np.searchsorted(short.timeline.ticks, problem.timeline.ticks)
+    np.testing.assert_array_equal(short.motor_stands(of_same), stands)
+    np.testing.assert_array_equal(short.dynamics.steps.at_ticks[of_same], problem.dynamics.steps.at_ticks)
