@@ -11,7 +11,7 @@ from jointscope.tools.verdicts.frequency_judgement import judge_frequency, judge
 from jointscope.tools.verdicts.judgement import Check, Judgement
 from jointscope.tools.verdicts.pose_judgement import judge_poses
 from jointscope.tools.verdicts.rests.beside_motion import rest_checks
-from jointscope.tools.verdicts.same_values import NAME, test_said
+from jointscope.tools.verdicts.same_values import NAME, agreed, test_said
 
 
 def judge_with_rests(result: WithRests) -> Judgement:
@@ -30,7 +30,7 @@ def _agree(result: WithRests) -> Check:
     """Springs, friction and geometry of rests against those of the other kinds."""
     said, others = test_said(result.agreement), others_named(result)
     if not result.agreement.doubtful:
-        return Check("good", NAME, f"Rests agree with {others}: {said}.")
+        return Check(*agreed(result.agreement, f"Rests agree with {others}", f"rests and {others}"))
     text = (
         f"Rests contradict {others}: {said}. Friction or stiffness at rest is not that of the other kind, a load or a "
         "mass is another, or one kind is of another arm: calibrate each alone and compare the values."
