@@ -76,8 +76,8 @@ def run_arm_search(
         candidates = diagnosed(result, sessions, recordings, progress)
         found = ArmDiscovery((ArmStep(None, result, None, (), tuple(candidates)),), "")
         if files.json is not None:
-            content = {"adequate": _adequate(candidates), "moved": moved_json(result)}
-            content["candidates"] = [candidate_json(c) for c in candidates]
+            ranked = [candidate_json(c) for c in candidates]
+            content = {"adequate": _adequate(candidates), "moved": moved_json(result), "candidates": ranked}
             write_json(files.json, content)
         leading = [c for c in candidates if c.verdict == "missing"][:3]
         said = explained_sentences(candidates) + [line for c in leading for line in told_apart(c)]
