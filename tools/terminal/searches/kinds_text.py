@@ -23,7 +23,7 @@ def kinds_text(found: KindsDiagnosis) -> str:
         text_table(HEAD, kinds_rows(found), "<" * len(HEAD)),
     ]
     if found.arm_base is not None:
-        parts += arm_discovery_text.moved_sentences(found.arm_base)
+        parts[1:1] = arm_discovery_text.moved_sentences(found.arm_base)
     if found.motion is not None:
         parts.append(f"Motion alone:\n{diagnosis_text(found.motion)}")
     if found.arm:
