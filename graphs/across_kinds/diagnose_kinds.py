@@ -24,6 +24,7 @@ from jointscope.graphs.across_kinds.said_by_kinds import (
 )
 from jointscope.graphs.discovery.diagnose import diagnose
 from jointscope.graphs.discovery.diagnosis_result import Diagnosis
+from jointscope.graphs.joint_kinds.arm_candidates import Calibrated
 from jointscope.graphs.joint_kinds.discover_arm import calibrated, diagnosed
 from jointscope.graphs.joint_kinds.effect_judge import ArmCandidate
 from jointscope.graphs.rest_search.discover_rests import RestDiscovery, diagnose_rests
@@ -46,6 +47,7 @@ class KindsDiagnosis:
         motion: of the recordings of motion; None without.
         arm: of poses and frequency responses; empty without.
         arm_kinds: which of these there are.
+        arm_base: the model calibrated with these; None without.
         rests: of the rests; None without.
     """
 
@@ -54,6 +56,7 @@ class KindsDiagnosis:
     motion: Diagnosis | None
     arm: tuple[ArmCandidate, ...]
     arm_kinds: tuple[str, ...]
+    arm_base: Calibrated | None
     rests: RestDiscovery | None
 
     @property
@@ -97,7 +100,7 @@ def diagnose_kinds(
     """
     report = progress or (lambda text, share: None)
     said: dict[str, dict[str, Said]] = {}
-    arm, kinds = list[ArmCandidate](), list[str]()
+    arm, kinds, base = list[ArmCandidate](), list[str](), None
     if sessions or shaken:
         report("poses and frequency responses", 0.0)
         base = calibrated(robot, sessions, shaken)
@@ -115,4 +118,4 @@ def diagnose_kinds(
     others = [label for kind, each in said.items() if kind not in kinds for label in each]
     for kind, each in unseen_by_arm(others, kinds).items():
         said[kind] = said[kind] | {label: nothing for label, nothing in each.items() if label not in said[kind]}
-    return KindsDiagnosis(robot, across_kinds(said), motion, tuple(arm), tuple(kinds), at_rest)
+    return KindsDiagnosis(robot, across_kinds(said), motion, tuple(arm), tuple(kinds), base, at_rest)

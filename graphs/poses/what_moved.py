@@ -38,7 +38,7 @@ class Step:
 
     Attributes:
         path: of the session.
-        before, after: names of the poses between which it is.
+        before, after: names of the poses between which it is; `before` is empty where it is all of the session.
         target: that moved on the tool; empty where all that was measured did.
         size: of the shift [m], or of the turn [rad]; of a joint how much more it reads, negative if less.
         turned: whether it is a turn.
@@ -61,8 +61,14 @@ class Step:
         since = f"From pose {self.after} of {self.path} on"
         if self.joint:
             more = "more" if self.size > 0.0 else "less"
+            reads = f"{self.joint} reads {1e3 * abs(self.size):.2g} mrad {more}"
+            if not self.before:
+                return (
+                    f"In all poses of {self.path} {reads} than in the other sessions: its coupling slipped or its "
+                    "encoder was zeroed anew; calibrate with that session alone, or with the others"
+                )
             return (
-                f"{since} {self.joint} reads {1e3 * abs(self.size):.2g} mrad {more}: its coupling slipped, its encoder "
+                f"{since} {reads}: its coupling slipped, its encoder "
                 f"lost counts{self.mimic}, or poses of another kind begin there and an effect is missing; calibrate "
                 f"with the poses up to {self.before} alone, or with the others"
             )
@@ -92,7 +98,7 @@ def what_moved(linear: LinearPoses, problems: Sequence[PoseSet], calibrations: S
     for problem, calibration in zip(problems, calibrations, strict=True):
         tracked = problem.poses.target is not None
         for shift in (*(_shifts(problem, calibration) if tracked else ()), *_jumps(problem, calibration)):
-            tries += _tries(linear, problem, shift, first)
+            tries += _tries(linear, problem, shift, first, bool(shift.joint) and len(problems) > 1)
         first += len(problem.poses)
     left = _left(linear)
     found = [(each, *each.scores(linear, left)) for each in tries if left.free > each.d]
@@ -214,11 +220,12 @@ class _Try:
         """The step from one of the starts on."""
         poses, shift = self.problem.poses, self.shift
         length = float(size[0]) if shift.joint else float(np.linalg.norm(size))
-        before, after = poses.names[self.before[i]], poses.names[self.starts[i]]
+        after = poses.names[self.starts[i]]
+        before = "" if self.starts[i] == self.before[i] else poses.names[self.before[i]]
         return Step(poses.path, before, after, shift.target, length, shift.turned, shift.joint, shift.mimic)
 
 
-def _tries(linear: LinearPoses, problem: PoseSet, shift: _Shift, first: int) -> list[_Try]:
+def _tries(linear: LinearPoses, problem: PoseSet, shift: _Shift, first: int, whole: bool) -> list[_Try]:
     """A shift from every pose on; nothing where too few poses show it.
 
     Args:
@@ -226,9 +233,12 @@ def _tries(linear: LinearPoses, problem: PoseSet, shift: _Shift, first: int) -> 
         problem: the session.
         shift: in its poses.
         first: number of its first pose among all.
+        whole: whether it may be all of the session.
     """
     poses = np.flatnonzero(np.any(shift.columns, axis=(1, 2)))
     starts = poses[:1] if shift.drifts else poses[FEWEST : len(poses) - FEWEST + 1]
+    if whole:
+        starts = np.append(poses[:1], starts)
     if len(starts) == 0:
         return []
     m, k, d = shift.columns.shape

@@ -78,6 +78,7 @@ def _misplaced(folder: Path, robot: Robot, errors: dict[str, float]) -> Robot:
         SimpleNamespace(
             poses=SimpleNamespace(link=None, tracker_link=None, targets=(), others=()),
             parameters=values,
+            values=errors,
             tree=robot.tree,
         ),
     )

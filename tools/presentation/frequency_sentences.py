@@ -63,6 +63,8 @@ def kinds_sentences(result: KindsCalibration) -> list[str]:
     how = "contradict each other" if found.doubtful else "agree"
     test = f"chi-square {significant(found.chi2, 3)} for {found.dof} directions that both determine, p = "
     lines = [f"poses and frequency responses {how}: {test}{significant(found.p_value, 2)}"]
+    if found.dof == 0:
+        lines = ["no value is told by both poses and frequency responses: whether they agree cannot be tested"]
     if found.doubtful:
         lines.append(
             "stiffness under weight is not that of the vibration, or one kind is of another arm: calibrate each alone "

@@ -23,9 +23,14 @@ SHOWN_SIZES = ("mean", "p90", "max")
 SIGMAS = 2.0  # of the bound that is said
 
 
-def pose_calibration_text(result: PoseCalibration) -> str:
-    """The summary of a calibration."""
-    parts = [_headline(result), _verdict(result), _tips(result), _parameters(result), _combinations(result)]
+def pose_calibration_text(result: PoseCalibration, beside: bool = False) -> str:
+    """The summary of a calibration.
+
+    Args:
+        result: the calibration.
+        beside: whether it is a part of one from several kinds, which has a verdict on all.
+    """
+    parts = [_headline(result), _verdict(result, beside), _tips(result), _parameters(result), _combinations(result)]
     return "\n\n".join(part for part in parts if part)
 
 
@@ -55,9 +60,9 @@ def _headline(result: PoseCalibration) -> str:
     )
 
 
-def _verdict(result: PoseCalibration) -> str:
+def _verdict(result: PoseCalibration, beside: bool) -> str:
     judgement = judge_poses(result)
-    lines = [judgement.headline]
+    lines = [f"{'As far as the poses say: ' * beside}{judgement.headline}"]
     lines += [f"  ! {check.name}? {check.text}" for check in judgement.checks if check.level in ("warn", "bad")]
     lines += [f"  - {check.text}" for check in judgement.checks if check.level in ("good", "info")]
     lines += [f"  - {notice.text}" for problem in result.problems for notice in problem.poses.notices]

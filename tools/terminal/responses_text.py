@@ -85,14 +85,19 @@ def resonance_rows(found: MeasuredResponse) -> list[list[str]]:
     return rows
 
 
-def frequency_calibration_text(result: FrequencyCalibration) -> str:
-    """The summary of a calibration."""
+def frequency_calibration_text(result: FrequencyCalibration, beside: bool = False) -> str:
+    """The summary of a calibration.
+
+    Args:
+        result: the calibration.
+        beside: whether it is a part of one from several kinds, which has a verdict on all.
+    """
     paths, judgement = ", ".join(problem.pose.path for problem in result.problems), judge_frequency(result)
     lines = [
         f"{result.robot.name} from {paths}: {counted(len(result.problems), 'pose')}, "
         f"calibrated in {result.wall_seconds:.1f} s, {result.iterations} iterations in {result.stages} stages",
         "",
-        judgement.headline,
+        f"{'As far as the responses say: ' * beside}{judgement.headline}",
         *(f"  ! {check.name}? {check.text}" for check in judgement.checks if check.level in ("warn", "bad")),
         *(f"  - {check.text}" for check in judgement.checks if check.level in ("good", "info")),
         f"  - {matrix_sentence(result)}",

@@ -10,19 +10,25 @@ from jointscope.graphs.rests.calibrate_rests import RestCalibration
 from jointscope.graphs.rests.rest_errors import RestErrors, rest_errors
 from jointscope.graphs.rests.rest_set import RestSet
 from jointscope.robots.model.robot import Robot
+from jointscope.tools.bags.clocks.durations import counted
 from jointscope.tools.presentation.numbers import significant, with_sigma
 from jointscope.tools.terminal.text_table import text_table
 from jointscope.tools.verdicts.rests.rest_verdict import verdict
 
 
-def rest_calibration_text(result: RestCalibration) -> str:
-    """The summary of a calibration."""
+def rest_calibration_text(result: RestCalibration, beside: bool = False) -> str:
+    """The summary of a calibration.
+
+    Args:
+        result: the calibration.
+        beside: whether it is a part of one from several kinds, which has a verdict on all.
+    """
     paths = ", ".join(problem.rests.path for problem in result.problems)
     lines = [
-        f"{result.robot.name} from {paths}: {result.count} rests, calibrated in {result.wall_seconds:.1f} s, "
-        f"{result.iterations} iterations",
+        f"{result.robot.name} from {paths}: {counted(result.count, 'rest')}, calibrated in "
+        f"{result.wall_seconds:.1f} s, {result.iterations} iterations",
         "",
-        verdict(result),
+        f"{'As far as the rests say: ' * beside}{verdict(result)}",
         f"  - links rest {significant(result.errors.error, 2)} sigma (rms) from where motors and loads put them, "
         f"{significant(result.before.error, 3)} before; 1 is expected",
     ]

@@ -159,7 +159,10 @@ def run_kinds_calibration(
     write_still(files, result.robot, made, page, content, urdf_files(result.robot, urdf))
     judgement = judge_kinds(result)
     agree = "\n".join(f"  - {sentence}" for sentence in kinds_sentences(result))
-    texts = [pose_calibration_text(result.poses), frequency_calibration_text(result.frequency)]
+    texts = [
+        pose_calibration_text(result.poses, beside=True),
+        frequency_calibration_text(result.frequency, beside=True),
+    ]
     return "\n\n".join([f"{judgement.headline}\n{agree}", *lacks[0], *texts]), checked
 
 

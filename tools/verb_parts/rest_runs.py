@@ -101,13 +101,13 @@ def run_calibration_with_rests(
     texts = []
     if result.poses is not None:
         made |= pose_origin(result.poses, robot)
-        texts.append(pose_calibration_text(result.poses))
+        texts.append(pose_calibration_text(result.poses, beside=True))
     if result.frequency is not None:
         made |= frequency_origin(result.frequency, robot)
-        texts.append(frequency_calibration_text(result.frequency))
+        texts.append(frequency_calibration_text(result.frequency, beside=True))
     page, content = partial(with_rests_report, result, checked), content | acceptance_json(checked)
     write_still(files, result.robot, made, page, content, urdf_files(result.robot, urdf))
-    return "\n\n".join([_said(result), *texts, rest_calibration_text(result.rests)]), checked
+    return "\n\n".join([_said(result), *texts, rest_calibration_text(result.rests, beside=True)]), checked
 
 
 def _said(result: Any) -> str:
@@ -116,7 +116,7 @@ def _said(result: Any) -> str:
 
     judgement = judge_with_rests(result)
     agree = judgement.checks[0]
-    return "\n".join([judgement.answer, *([f"  - {agree.text}"] if agree.level == "good" else [])])
+    return "\n".join([judgement.answer, *([f"  - {agree.text}"] if agree.level in ("good", "info") else [])])
 
 
 def _with_rests_json(result: Any) -> dict[str, Any]:

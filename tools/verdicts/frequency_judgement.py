@@ -17,7 +17,7 @@ from jointscope.tools.verdicts.judgement import Check, Judgement
 from jointscope.tools.verdicts.pose_judgement import judge_poses
 from jointscope.tools.verdicts.priors.far_from_priors import NAME as AS_EXPECTED_BY_PRIORS
 from jointscope.tools.verdicts.priors.far_from_priors import far_parameters
-from jointscope.tools.verdicts.same_values import NAME, test_said
+from jointscope.tools.verdicts.same_values import NAME, agreed, test_said
 
 AS_NOISE = 3.0  # power of what is left over that of the noise: up to here friction adds little
 ANSWERS_BACK = (
@@ -46,7 +46,7 @@ def judge_kinds(result: KindsCalibration) -> Judgement:
         )
         agree = Check("bad", NAME, text)
     else:
-        agree = Check("good", NAME, f"Poses and frequency responses agree: {test_said(found)}.")
+        agree = Check(*agreed(found, "Poses and frequency responses agree", "poses and frequency responses"))
     return Judgement.of((agree, *judge_poses(result.poses).checks, *judge_frequency(result.frequency).checks))
 
 

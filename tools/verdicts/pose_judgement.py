@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 from collections import Counter
+from functools import lru_cache
 
 import numpy as np
 
@@ -15,7 +16,7 @@ from jointscope.graphs.poses.pose_set import PoseSet
 from jointscope.graphs.poses.screen_contacts import moved_contacts
 from jointscope.graphs.poses.tip_errors import summary
 from jointscope.graphs.poses.untold_distances import untold_distance
-from jointscope.graphs.poses.what_moved import what_moved, with_ends
+from jointscope.graphs.poses.what_moved import Step, what_moved, with_ends
 from jointscope.robots.geometry.error_parameters import BACKLASH
 from jointscope.tools.presentation.numbers import significant
 from jointscope.tools.verdicts.judgement import Check, Judgement
@@ -115,11 +116,17 @@ def _elsewhere_held(result: PoseCalibration) -> str:
 def _still(result: PoseCalibration) -> Check:
     """Whether tracker, targets and zeros of joints stayed: no step in what is left, anywhere in a session."""
     name = "A tracker that stands still, targets that sit fast and joints that keep their zero"
-    problems = with_ends(result.problems, result.whole)
-    step = what_moved(LinearPoses.at(result.robot, problems, result.calibrations), problems, result.calibrations)
+    step = moved_during(result)
     if step is None:
         return Check("good", name, "The residuals show no step over the session.")
     return Check("bad", name, f"{step.text}.")
+
+
+@lru_cache(maxsize=4)
+def moved_during(result: PoseCalibration) -> Step | None:
+    """What moved during a session, or None; of one calibration it is asked once."""
+    problems = with_ends(result.problems, result.whole)
+    return what_moved(LinearPoses.at(result.robot, problems, result.calibrations), problems, result.calibrations)
 
 
 def _geometric(result: PoseCalibration) -> set[str]:
@@ -216,12 +223,15 @@ def _lacks(result: PoseCalibration) -> Check:
     sizes = ", ".join(significant(size, 3) for size in first.sizes)
     unit = "rad/(N m)" if first.hypothesis.kind.soft else first.hypothesis.kind.unit
     also = f"; then {', '.join(c.hypothesis.label for c in others[:2])}" if others else ""
+    looks = f"What is left looks like {first.hypothesis.label}, about {sizes} {unit} (by chance: {first.p_value:.0e})"
+    if moved_during(result) is not None:
+        text = f"{looks}{also}, which may stand in for what moved: calibrate without that first."
+        return Check("warn", name, text)
     return Check(
         "warn",
         name,
-        f"What is left looks like {first.hypothesis.label}, about {sizes} {unit} (by chance: {first.p_value:.0e}){also}"
-        "; other values may be wrong by many of their sigmas until it is in the model: `jointscope diagnose` with the "
-        "same poses ranks what it may be, `jointscope discover` adds it.",
+        f"{looks}{also}; other values may be wrong by many of their sigmas until it is in the model: "
+        "`jointscope diagnose` with the same poses ranks what it may be, `jointscope discover` adds it.",
     )
 
 

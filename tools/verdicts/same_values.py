@@ -22,12 +22,25 @@ def same_values(result: CalibrationResult) -> list[tuple[str, str, str]]:
         return []
     said = test_said(found)
     if not found.doubtful:
-        return [("good", NAME, f"Motion and frequency responses agree: {said}.")]
+        return [agreed(found, "Motion and frequency responses agree", "motion and frequency responses")]
     text = (
         f"Motion and frequency responses contradict each other: {said}. The model lacks an effect that one of them "
         "shows, the load was another, or the robot changed. `jointscope diagnose` with each alone says what it may be."
     )
     return [("bad", NAME, text)]
+
+
+def agreed(test: Agreement, said: str, kinds: str) -> tuple[str, str, str]:
+    """Level, name and sentence where kinds do not contradict each other; none is told of kinds with no value in common.
+
+    Args:
+        test: of the kinds.
+        said: that they agree.
+        kinds: their names.
+    """
+    if test.dof == 0:
+        return "info", NAME, f"No value is told by both {kinds}: whether they agree cannot be tested."
+    return "good", NAME, f"{said}: {test_said(test)}."
 
 
 def test_said(test: Agreement) -> str:

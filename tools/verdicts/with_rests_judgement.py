@@ -10,13 +10,18 @@ from jointscope.graphs.poses.calibrate_poses import PoseCalibration
 from jointscope.tools.verdicts.frequency_judgement import judge_frequency, judge_kinds
 from jointscope.tools.verdicts.judgement import Check, Judgement
 from jointscope.tools.verdicts.pose_judgement import judge_poses
-from jointscope.tools.verdicts.rests.beside_motion import rest_checks
-from jointscope.tools.verdicts.same_values import NAME, test_said
+from jointscope.tools.verdicts.rests.beside_motion import TOLD, rest_checks
+from jointscope.tools.verdicts.rests.rest_verdict import hardly_told
+from jointscope.tools.verdicts.same_values import NAME, agreed, test_said
 
 
 def judge_with_rests(result: WithRests) -> Judgement:
     """Applies all checks of all kinds."""
     rests = [Check(*each) for each in rest_checks(result.rests.seen)]
+    _, untold = hardly_told(result.rests)
+    if untold:
+        rests = [check for check in rests if check.name != TOLD]
+        rests.append(Check("warn", TOLD, f"{untold[0].upper()}{untold[1:]}."))
     return Judgement.of((_agree(result), *rests, *_judged(result.others).checks))
 
 
@@ -30,7 +35,7 @@ def _agree(result: WithRests) -> Check:
     """Springs, friction and geometry of rests against those of the other kinds."""
     said, others = test_said(result.agreement), others_named(result)
     if not result.agreement.doubtful:
-        return Check("good", NAME, f"Rests agree with {others}: {said}.")
+        return Check(*agreed(result.agreement, f"Rests agree with {others}", f"rests and {others}"))
     text = (
         f"Rests contradict {others}: {said}. Friction or stiffness at rest is not that of the other kind, a load or a "
         "mass is another, or one kind is of another arm: calibrate each alone and compare the values."

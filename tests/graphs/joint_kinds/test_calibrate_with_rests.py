@@ -25,6 +25,7 @@ from jointscope.tools.bags.at_poses.pose_table import pose_table
 from jointscope.tools.command_line import main
 from jointscope.tools.simulator.frequency_simulation import Shaking, simulate_frequency
 from jointscope.tools.simulator.pose_simulation import PoseConditions
+from jointscope.tools.verdicts.rests.beside_motion import TOLD
 from jointscope.tools.verdicts.with_rests_judgement import judge_with_rests
 
 SPRINGS = ["joint2.stiffness", "joint3.stiffness"]  # the first axis is upright, and nothing hangs on it
@@ -82,6 +83,14 @@ def test_a_drive_that_is_softer_at_rest_is_a_contradiction(arm):
     found = calibrate_with_rests(robot, [rested(robot, 30, SEED, softer=1.2)], [poses])
     agree, *_ = judge_with_rests(found).checks
     assert found.agreement.doubtful and agree.level == "bad" and "Rests contradict poses" in agree.text
+
+
+def test_a_rest_or_two_that_tell_nothing_are_no_yes(arm):
+    robot, rests, poses, _ = arm
+    few = calibrate_with_rests(robot, [rests.only(np.arange(30) < 1)], [poses])
+    judgement = judge_with_rests(few)
+    (untold,) = [check for check in judgement.checks if check.name == TOLD]
+    assert judgement.level == "warn" and untold.level == "warn" and untold.text.startswith("These rests ")
 
 
 def test_rests_alone_have_a_function_of_their_own(arm):

@@ -16,7 +16,7 @@ from jointscope.graphs.poses.what_moved import what_moved, with_ends
 from jointscope.robots.files.robot_file import load_robot
 from jointscope.tools.bags.at_poses.read_poses import read_poses
 from jointscope.tools.simulator.pose_simulation import PoseConditions, simulate_poses
-from jointscope.tools.verdicts.pose_judgement import judge_poses
+from jointscope.tools.verdicts.pose_judgement import judge_poses, moved_during
 
 pytest.importorskip("mujoco", reason="the simulator needs the extra jointscope[sim]")
 
@@ -59,6 +59,23 @@ def test_poses_behind_a_jump_that_are_all_left_out_are_no_outliers_but_a_jump(ro
     assert step.text.startswith("From pose 72 of simulation on joint3 reads 1.7 mrad more: its coupling slipped")
     result, step = found_in(robot, replace(jumped(poses, 2, -1e-3, 0), q=jumped(poses, 2, 1e-3, 7).q))
     assert (step.joint, step.after) == ("joint2", "7") and len(result.left_out) == 7
+
+
+def in_two(poses):
+    first, second = (poses.only(each < 40) for each in (np.arange(80), 79 - np.arange(80)))
+    return [replace(first, path="first.csv"), replace(second, path="second.csv")]
+
+
+def test_a_zero_that_moved_between_two_sessions_is_named_with_the_session(robot, poses):
+    for size in (0.0, 1.2e-3):
+        result = calibrate_poses(robot, in_two(jumped(poses, 3, size, 40)))
+        step = moved_during(result)
+        if not size:
+            assert step is None
+            continue
+        assert (step.joint, step.before) == ("joint3", "") and "than in the other sessions" in step.text
+        sign = 1.0 if step.path == "second.csv" else -1.0
+        assert abs(sign * step.size - size) < 0.1 * size
 
 
 def test_a_pose_or_two_that_fit_nothing_are_no_jump(robot, poses):

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from jointscope.graphs.joint_kinds.arm_candidates import Calibrated
 from jointscope.graphs.joint_kinds.discover_arm import ArmDiscovery, ArmStep
 from jointscope.graphs.joint_kinds.effect_judge import ArmCandidate
 from jointscope.graphs.poses.tip_errors import TipErrors, summary
@@ -14,6 +15,7 @@ from jointscope.robots.geometry.arm_effects import FREQUENCY, POSES
 from jointscope.tools.bags.clocks.durations import counted
 from jointscope.tools.presentation.numbers import percent, significant
 from jointscope.tools.terminal.text_table import text_table
+from jointscope.tools.verdicts.pose_judgement import moved_during
 
 SHOWN = 8
 MOST_TIMES = 4.0  # as many poses: more than these are no advice
@@ -86,9 +88,15 @@ def unseen_sentences(candidates: Sequence[ArmCandidate], kinds: Sequence[str]) -
     return [f"{', '.join(ids)} not testable by {WORDS[kind]}: {why}" for (kind, why), ids in found.items() if ids]
 
 
+def moved_sentences(calibration: Calibrated) -> list[str]:
+    """What moved during a session, for which effects may stand in; nothing where all stayed."""
+    step = None if calibration.poses is None else moved_during(calibration.poses)
+    return [] if step is None else [f"! {step.text}; until then what is listed here may stand in for it."]
+
+
 def limit_sentences(step: ArmStep) -> list[str]:
     """What more poses would tell, and how large effects must be to show in these; nothing with other recordings."""
-    if step.calibrated.poses is None or step.calibrated.frequency is not None:
+    if step.calibrated.poses is None or step.calibrated.frequency is not None or moved_sentences(step.calibrated):
         return []
     count, said = step.result.count, list[str]()
     looked = [c for c in step.candidates if c.verdict not in ("missing", "untestable")]
@@ -140,6 +148,7 @@ def arm_discovery_text(found: ArmDiscovery) -> str:
             said.append(f"{label} cannot be told from {', '.join(step.added.look_alikes)} by {these}")
         said += told_apart(step.added)
     parts = [
+        *moved_sentences(found.steps[0].calibrated),
         text_table(head, rows, "<<" + ">" * (len(head) - 2)),
         f"The search ended because {found.stop_reason}.",
         *said,

@@ -22,6 +22,8 @@ def kinds_text(found: KindsDiagnosis) -> str:
         "\n".join([kinds_headline(found), *(f"  - {sentence}" for sentence in kinds_sentences(found))]),
         text_table(HEAD, kinds_rows(found), "<" * len(HEAD)),
     ]
+    if found.arm_base is not None:
+        parts[1:1] = arm_discovery_text.moved_sentences(found.arm_base)
     if found.motion is not None:
         parts.append(f"Motion alone:\n{diagnosis_text(found.motion)}")
     if found.arm:

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import asdict
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -54,6 +55,7 @@ def run_arm_search(
         arm_discovery_text,
         explained_sentences,
         limit_sentences,
+        moved_sentences,
         ranking_text,
         recordings_said,
         told_apart,
@@ -74,16 +76,28 @@ def run_arm_search(
         candidates = diagnosed(result, sessions, recordings, progress)
         found = ArmDiscovery((ArmStep(None, result, None, (), tuple(candidates)),), "")
         if files.json is not None:
-            content = {"adequate": _adequate(candidates), "candidates": [candidate_json(c) for c in candidates]}
+            ranked = [candidate_json(c) for c in candidates]
+            content = {"adequate": _adequate(candidates), "moved": moved_json(result), "candidates": ranked}
             write_json(files.json, content)
         leading = [c for c in candidates if c.verdict == "missing"][:3]
         said = explained_sentences(candidates) + [line for c in leading for line in told_apart(c)]
         said += unseen_sentences(candidates, found.kinds if len(found.kinds) > 1 else ())
         said += limit_sentences(found.steps[0])
-        return "\n\n".join([ranking_text(candidates, recordings_said(found), found.kinds), *said])
+        said = [*moved_sentences(result), ranking_text(candidates, recordings_said(found), found.kinds), *said]
+        return "\n\n".join(said)
     found = discover_arm(robot, sessions, held, progress, recordings, held_shaken)
     write_still(files, found.robot, _origin(found, robot), partial(_page, found), _discovery(found, files.robot))
     return arm_discovery_text(found)
+
+
+def moved_json(calibration: Any) -> dict[str, Any] | None:
+    """What moved during a session of poses, for machines."""
+    from jointscope.tools.verdicts.pose_judgement import moved_during
+
+    step = None if calibration.poses is None else moved_during(calibration.poses)
+    if step is None:
+        return None
+    return {name: each for name, each in asdict(step).items() if name != "mimic"} | {"text": step.text}
 
 
 def candidate_json(c: Any) -> dict[str, Any]:
@@ -146,6 +160,7 @@ def _discovery(found: Any, robot_file: Path | None) -> dict[str, Any]:
         "steps": steps,
         "stop_reason": found.stop_reason,
         "adequate": _adequate(last),
+        "moved": moved_json(found.steps[0].calibrated),
         "robot_file": None if robot_file is None else str(robot_file),
     }
 

@@ -90,7 +90,10 @@ def kinds_json(found: Any) -> dict[str, Any]:
     if found.motion is not None:
         by_graph["motion"] = found.motion.to_json()
     if found.arm:
-        by_graph["arm"] = {"candidates": [arm_search.candidate_json(c) for c in found.arm]}
+        by_graph["arm"] = {
+            "moved": None if found.arm_base is None else arm_search.moved_json(found.arm_base),
+            "candidates": [arm_search.candidate_json(c) for c in found.arm],
+        }
     if found.rests is not None:
         by_graph["rests"] = rest_search.diagnosis_json(found.rests)
     return {"adequate": found.adequate, "candidates": [_effect(c) for c in found.candidates], "by_graph": by_graph}

@@ -42,25 +42,34 @@ def verdict(result: RestCalibration) -> str:
         if result.count <= values:
             few = f"{counted(result.count, 'rest')} for {values} values of {owner}"
             return f"{NO}: {few}; nothing could contradict them."
-    if not result.parameters and len(seen.stood) == len(result.robot.joints):
-        return f"{NO}: these rests determine no value; {standing(seen)}."
+    level, said = hardly_told(result)
+    if said and not result.parameters:
+        return f"{SO[level]}: {said}."
     if doubt := open_gains(seen):
         return f"{USABLE}: {doubt}."
-    values_of, silent = result.robot.parameters, standing(seen) or from_one_side(seen)
-    told = [p for p in result.parameters if values_of[p.name].positive and values_of[p.name].null is None]
-    loose = [p for p in told if p.sigma > LOOSE * p.value]
-    if loose:
-        names = ", ".join(f"{p.name} ({relative_sigma(p.sigma / abs(p.value))})" for p in loose)
-        so = NO if len(loose) == len(told) else USABLE
-        return (
-            f"{so}: these rests hardly determine {names}; let it rest {_more(result, loose)}{silent and f'; {silent}'}."
-        )
+    silent = standing(seen) or from_one_side(seen)
+    if said:
+        return f"{SO[level]}: {said}{silent and f'; {silent}'}."
     if silent:
         return f"{USABLE}: {silent}."
     if result.errors.error > AS_EXPECTED or _widened(seen)[1] > WIDENED:
         return f"{USABLE}: links rest further from where the model says than their encoders explain."
     limits = unchecked(seen)
     return f"Yes, the model holds at these rests{f', as far as they tell. {limits}' if limits else ''}."
+
+
+def hardly_told(result: RestCalibration) -> tuple[str, str]:
+    """Level of `judgement.LEVELS` and values that are hardly known; empty where all are known."""
+    seen, values_of = result.seen, result.robot.parameters
+    if not result.parameters and len(seen.stood) == len(result.robot.joints):
+        return "bad", f"these rests determine no value; {standing(seen)}"
+    told = [p for p in result.parameters if values_of[p.name].positive and values_of[p.name].null is None]
+    loose = [p for p in told if p.sigma > LOOSE * p.value]
+    if not loose:
+        return "good", ""
+    names = ", ".join(f"{p.name} ({relative_sigma(p.sigma / abs(p.value))})" for p in loose)
+    level = "bad" if len(loose) == len(told) else "warn"
+    return level, f"these rests hardly determine {names}; let it rest {_more(result, loose)}"
 
 
 def contradiction(seen: SeenRests) -> tuple[str, str]:
