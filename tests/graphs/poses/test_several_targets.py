@@ -325,7 +325,7 @@ def step_of(robot, poses):
         found = calibrate_poses(robot, [poses])
     except SolveError as err:
         robot, problems = placed(robot, [poses])
-        known = solve(problems, _estimate(problems, ()), max_iterations=400, progress=None).estimate.calibrations
+        known = solve(problems, _estimate(problems, (), ()), max_iterations=400, progress=None).estimate.calibrations
         step = what_moved(LinearPoses.at(with_fitted(robot, known), problems, known), problems, known)
         assert step.text in str(err)
         return step
