@@ -141,6 +141,15 @@ class BagProblem:
         between = known if edges is None else np.union1d(known, edges.times(ticks, x, known))
         if len(between) == len(known):
             return self, x
+        return self.divided_at(between, x)
+
+    def divided_at(self, between: Array, x: Array) -> tuple[BagProblem, Array]:
+        """The same with its steps divided at some times, and its states there, too.
+
+        Args:
+            between: all times that divide steps [s].
+            x: states at its ticks, shape (m + 1, d).
+        """
         divided = replace(BagProblem.of(self.robot, self.recording, between), owner=self.owner)
         step, fraction = self.timeline.locate(divided.timeline.ticks)
         states = interpolate(self.robot.layout, x[step], x[step + 1], fraction, self.timeline.h[step])

@@ -37,8 +37,8 @@ class DeadZoneEdges:
     @staticmethod
     def of(robot: Robot) -> DeadZoneEdges | None:
         """None where no spring has a dead zone, or the integrator is one that a robot file asks for as it is."""
-        values = {name: p.value for name, p in robot.parameters.items()}
-        transmission, layout, rows, edges = Transmission.of(robot), robot.layout, [], []
+        values, transmission, layout = robot.values, Transmission.of(robot), robot.layout
+        rows, edges = list[Array](), list[tuple[float, float]]()
         S = np.eye(layout.size) if transmission is None else transmission.maps(values)[0]
         for here in robot.effects:
             if isinstance(here.effect, JointTorque) and here.effect.gap:

@@ -166,9 +166,7 @@ def _with_short_reversals(
     between = times_of_reversals(robot, ticks, x)
     if not len(between) or robot.choices.integrator != "simpson":
         return problem, x, calibration
-    divided = BagProblem.of(robot, problem.recording, between)
-    step, fraction = problem.timeline.locate(divided.timeline.ticks)
-    start = interpolate(robot.layout, x[step], x[step + 1], fraction, problem.timeline.h[step])
+    divided, start = problem.divided_at(between, x)
     hold = (DYNAMICS, *(rotation_block(gyro.name) for gyro in robot.gyros))
     estimate = solve([divided], Estimate((start,), (calibration,)), hold=hold).estimate
     return divided, estimate.states[0], estimate.calibrations[0]
