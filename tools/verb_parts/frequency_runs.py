@@ -5,7 +5,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from contextlib import ExitStack
-from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -16,7 +15,7 @@ from jointscope.tools.acceptance.evaluation import AcceptedBy, acceptance_json, 
 from jointscope.tools.acceptance.limits import Limit
 from jointscope.tools.terminal.progress import Progress
 from jointscope.tools.verb_parts.pose_runs import pose_json, pose_origin, urdf_files
-from jointscope.tools.verb_parts.result_files import ResultFiles, write_report, write_still
+from jointscope.tools.verb_parts.result_files import ResultFiles, refuse_viewer, write_found, write_report
 from jointscope.tools.writing.origin import made_from
 from jointscope.tools.writing.whole_file import whole_file, write_json
 
@@ -36,14 +35,12 @@ def run_frequency_calibration(
     from jointscope.tools.terminal.responses_text import frequency_calibration_text
     from jointscope.tools.verdicts.frequency_judgement import judge_frequency
 
-    if files.rrd is not None:
-        raise RobotError(f"{robot.name}: --rrd shows motion, not frequency responses; use --report")
+    refuse_viewer(files, robot, "frequency responses")
     result = calibrate_frequency(robot, read_all_shaken(robot, paths, progress), progress)
     lacks = _lacking(Calibrated(None, result), progress)
     content = result.to_json() | judge_frequency(result).to_json() | lacks[1]
-    checked = check_models(limits, {robot.name: content})
-    page, content = partial(frequency_report, result, checked), content | acceptance_json(checked)
-    write_still(files, result.robot, frequency_origin(result, robot), page, content)
+    made = frequency_origin(result, robot)
+    checked = write_found(files, robot.name, result, frequency_report, made, content, limits)
     return "\n\n".join([frequency_calibration_text(result), *lacks[0]]), checked
 
 
@@ -147,16 +144,14 @@ def run_kinds_calibration(
     from jointscope.tools.terminal.responses_text import frequency_calibration_text
     from jointscope.tools.verdicts.frequency_judgement import judge_kinds
 
-    if files.rrd is not None:
-        raise RobotError(f"{robot.name}: --rrd shows motion, not poses or frequency responses; use --report")
+    refuse_viewer(files, robot, "poses or frequency responses")
     sessions = [read_poses(path, robot) for path in poses]
     result = calibrate_kinds(robot, read_all_shaken(robot, bags, progress), sessions, progress)
     lacks = _lacking(Calibrated(result.poses, result.frequency), progress)
     content = kinds_json(result) | lacks[1]
-    checked = check_models(limits, {robot.name: content})
-    page, content = partial(kinds_report, result, checked), content | acceptance_json(checked)
     made = pose_origin(result.poses, robot) | frequency_origin(result.frequency, robot)
-    write_still(files, result.robot, made, page, content, urdf_files(result.robot, urdf))
+    others = urdf_files(result.robot, urdf)
+    checked = write_found(files, robot.name, result, kinds_report, made, content, limits, others)
     judgement = judge_kinds(result)
     agree = "\n".join(f"  - {sentence}" for sentence in kinds_sentences(result))
     texts = [

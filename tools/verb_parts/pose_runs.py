@@ -4,18 +4,17 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from functools import partial
 from pathlib import Path
 from typing import Any
 
-from jointscope.robots.errors import RecordingError, RobotError
+from jointscope.robots.errors import RecordingError
 from jointscope.robots.model.robot import Robot
 from jointscope.robots.recordings.poses import Poses
 from jointscope.robots.recordings.recording import must_count_once
-from jointscope.tools.acceptance.evaluation import AcceptedBy, acceptance_json, check_models
+from jointscope.tools.acceptance.evaluation import AcceptedBy
 from jointscope.tools.acceptance.limits import Limit
 from jointscope.tools.terminal.progress import Progress
-from jointscope.tools.verb_parts.result_files import ResultFiles, write_still
+from jointscope.tools.verb_parts.result_files import ResultFiles, refuse_viewer, write_found
 from jointscope.tools.writing.origin import made_from
 
 
@@ -83,13 +82,10 @@ def run_pose_calibration(
     from jointscope.tools.report.poses_report import poses_report
     from jointscope.tools.terminal.poses_text import pose_calibration_text
 
-    if files.rrd is not None:
-        raise RobotError(f"{robot.name}: --rrd shows motion, not poses; use --report")
+    refuse_viewer(files, robot, "poses")
     result = calibrate_poses(robot, [read_poses(path, robot) for path in paths], progress)
-    content = pose_json(result)
-    checked = check_models(limits, {robot.name: content})
-    page, content = partial(poses_report, result, checked=checked), content | acceptance_json(checked)
-    write_still(files, result.robot, pose_origin(result, robot), page, content, urdf_files(result.robot, urdf))
+    made, others = pose_origin(result, robot), urdf_files(result.robot, urdf)
+    checked = write_found(files, robot.name, result, poses_report, made, pose_json(result), limits, others)
     return pose_calibration_text(result), checked
 
 

@@ -5,19 +5,18 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Mapping, Sequence
-from functools import partial
 from pathlib import Path
 from typing import Any
 
-from jointscope.robots.errors import RecordingError, RobotError
+from jointscope.robots.errors import RecordingError
 from jointscope.robots.model.robot import Robot
 from jointscope.robots.rests.rests import Rests
-from jointscope.tools.acceptance.evaluation import AcceptedBy, acceptance_json, check_models
+from jointscope.tools.acceptance.evaluation import AcceptedBy
 from jointscope.tools.acceptance.limits import Limit
 from jointscope.tools.terminal.progress import Progress
 from jointscope.tools.verb_parts.frequency_runs import agreement_json, frequency_origin, kinds_json, read_all_shaken
 from jointscope.tools.verb_parts.pose_runs import pose_json, pose_origin, urdf_files
-from jointscope.tools.verb_parts.result_files import ResultFiles, write_still
+from jointscope.tools.verb_parts.result_files import ResultFiles, refuse_viewer, write_found
 from jointscope.tools.writing.origin import made_from, other_kinds
 
 
@@ -58,13 +57,10 @@ def run_rest_calibration(
     from jointscope.tools.report.rests_report import rests_report
     from jointscope.tools.terminal.rests_text import rest_calibration_text
 
-    if files.rrd is not None:
-        raise RobotError(f"{robot.name}: --rrd shows motion, not rests; use --report")
+    refuse_viewer(files, robot, "rests")
     result = calibrate_rests(robot, read_all_rests(paths, robot, progress), progress)
-    content = result.to_json()
-    checked = check_models(limits, {robot.name: content})
-    page, content = partial(rests_report, result, checked), content | acceptance_json(checked)
-    write_still(files, result.robot, made_from(robot.path.name) | other_kinds(result), page, content)
+    made = made_from(robot.path.name) | other_kinds(result)
+    checked = write_found(files, robot.name, result, rests_report, made, result.to_json(), limits)
     return rest_calibration_text(result), checked
 
 
@@ -91,12 +87,9 @@ def run_calibration_with_rests(
     from jointscope.tools.terminal.responses_text import frequency_calibration_text
     from jointscope.tools.terminal.rests_text import rest_calibration_text
 
-    if files.rrd is not None:
-        raise RobotError(f"{robot.name}: --rrd shows motion, not rests; use --report")
+    refuse_viewer(files, robot, "rests")
     at_rest, sessions = read_all_rests(rests, robot, progress), [read_poses(path, robot) for path in poses]
     result = calibrate_with_rests(robot, at_rest, sessions, read_all_shaken(robot, shaken, progress), progress)
-    content = _with_rests_json(result)
-    checked = check_models(limits, {robot.name: content})
     made = made_from(robot.path.name) | other_kinds(result.rests)
     texts = []
     if result.poses is not None:
@@ -105,8 +98,8 @@ def run_calibration_with_rests(
     if result.frequency is not None:
         made |= frequency_origin(result.frequency, robot)
         texts.append(frequency_calibration_text(result.frequency, beside=True))
-    page, content = partial(with_rests_report, result, checked), content | acceptance_json(checked)
-    write_still(files, result.robot, made, page, content, urdf_files(result.robot, urdf))
+    content, others = _with_rests_json(result), urdf_files(result.robot, urdf)
+    checked = write_found(files, robot.name, result, with_rests_report, made, content, limits, others)
     return "\n\n".join([_said(result), *texts, rest_calibration_text(result.rests, beside=True)]), checked
 
 

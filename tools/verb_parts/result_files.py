@@ -15,7 +15,8 @@ from typing import Any
 from jointscope.robots.errors import JointscopeError, RobotError
 from jointscope.robots.model.robot import Robot
 from jointscope.robots.outside_modules import need_module
-from jointscope.tools.acceptance.evaluation import NO_LIMITS, AcceptedBy, acceptance_json
+from jointscope.tools.acceptance.evaluation import NO_LIMITS, AcceptedBy, acceptance_json, check_models
+from jointscope.tools.acceptance.limits import Limit
 from jointscope.tools.writing.origin import provenance, recordings_of, step_provenance
 from jointscope.tools.writing.whole_file import check_outputs, whole_file, write_json
 
@@ -193,6 +194,16 @@ def _write(
             write_json(stack.enter_context(whole_file(files.json)), result.to_json() | more())
 
 
+def refuse_viewer(files: ResultFiles, robot: Robot, what: str) -> None:
+    """A viewer recording shows motion, and nothing of what was given in its place.
+
+    Raises:
+        RobotError: one was asked for.
+    """
+    if files.rrd is not None:
+        raise RobotError(f"{robot.name}: --rrd shows motion, not {what}; use --report")
+
+
 def write_still(
     files: ResultFiles,
     robot: Robot,
@@ -223,6 +234,37 @@ def write_still(
         write_report(stack, files, lambda: report(more=[provenance_without_motion(made, robot)]))
         if files.json is not None:
             write_json(stack.enter_context(whole_file(files.json)), content | {"recordings": recordings_of(made)})
+
+
+def write_found(
+    files: ResultFiles,
+    name: str,
+    result: Any,
+    report: Callable[..., str],
+    made: dict[str, Any],
+    content: dict[str, Any],
+    limits: Sequence[Limit],
+    others: Mapping[Path, str] | None = None,
+) -> AcceptedBy:
+    """Writes what was calibrated without motion, and returns which limits it keeps.
+
+    Args:
+        files: where to.
+        name: of the robot that was calibrated.
+        result: with the robot that was found.
+        report: makes the page of the result and of the limits as they came out.
+        made: where its numbers come from.
+        content: of the JSON without limits and recordings.
+        limits: that the user has declared.
+        others: texts of further files.
+
+    Raises:
+        JointscopeError: a file cannot be written; then none is.
+    """
+    checked = check_models(limits, {name: content})
+    page = partial(report, result, checked)
+    write_still(files, result.robot, made, page, content | acceptance_json(checked), others)
+    return checked
 
 
 def write_robot(stack: ExitStack, files: ResultFiles, robot: Robot, made: dict[str, Any]) -> None:

@@ -10,11 +10,10 @@ from typing import Any
 
 import numpy as np
 
-from jointscope.robots.errors import RobotError
 from jointscope.robots.model.robot import Robot
 from jointscope.tools.terminal.progress import Progress
 from jointscope.tools.verb_parts.rest_runs import read_all_rests
-from jointscope.tools.verb_parts.result_files import ResultFiles, write_still
+from jointscope.tools.verb_parts.result_files import ResultFiles, refuse_viewer, write_still
 from jointscope.tools.writing.origin import made_from, other_kinds
 
 KIND = "rests"
@@ -41,8 +40,7 @@ def run_rest_search(
     from jointscope.tools.report.searches.rest_search_report import rest_search_report
     from jointscope.tools.terminal.searches.rest_search_text import rest_search_text
 
-    if files.rrd is not None:
-        raise RobotError(f"{robot.name}: --rrd shows motion, not rests; use --report")
+    refuse_viewer(files, robot, "rests")
     recordings, held = (read_all_rests(paths, robot, progress) for paths in (given, holdout))
     if search:
         found = discover_rests(robot, recordings, held, progress)
