@@ -80,16 +80,19 @@ def _settled(problem: BagProblem, begin: FilteredStates, calibration: Calibratio
 
     predictor = Predictor(problem.robot, problem.timeline)
     mean, information = begin.mean.copy(), np.empty_like(begin.covariance)
-    information[0] = _inverse(begin.covariance[:1])[0]
-    for first in range(0, len(mean) - 1, CHUNK):
+    known_from = int(np.argmax(np.all(np.isfinite(begin.covariance), axis=(1, 2))))  # sensors may begin later
+    information[: known_from + 1] = _inverse(begin.covariance[: known_from + 1])
+    for first in range(known_from, len(mean) - 1, CHUNK):
         ticks = np.arange(first, min(first + CHUNK, len(mean) - 1))
         own = slice(first, first + len(ticks) + 1)
         before = np.inf
         for _ in range(ROUNDS):
             H, g, ahead = _linear_steps(problem, predictor, mean, ticks, calibration)
             found, known, good = filter_steps(H, g, mean[own], ahead, mean[first], information[first])
+            if not good:  # the rest was never written
+                return None
             change = np.abs(found - mean[own]) * np.sqrt(np.einsum("kii->ki", known))
-            if not good or not np.all(np.isfinite(change)):
+            if not np.all(np.isfinite(change)):
                 return None
             mean[own], information[own] = found, known
             now = float(np.max(change))
@@ -234,8 +237,12 @@ def _rows_by_tick(placed: Placed, problem: BagProblem) -> tuple[NDArray[np.intp]
 
 
 def _balanced(H: Array) -> tuple[Array, Array]:
-    """Matrices scaled to a unit diagonal, and the scale: their rows differ by ten orders of magnitude."""
-    scale = 1.0 / np.sqrt(np.einsum("kii->ki", H))
+    """Matrices scaled to a unit diagonal, and the scale: their rows differ by ten orders of magnitude.
+
+    Not a number where the diagonal is not positive, as that of a state of which nothing is known.
+    """
+    diagonal = np.einsum("kii->ki", H)
+    scale = 1.0 / np.sqrt(np.where(diagonal > 0.0, diagonal, np.nan))
     balanced = H * scale[:, :, None] * scale[:, None, :]
     return 0.5 * (balanced + balanced.transpose(0, 2, 1)), scale
 

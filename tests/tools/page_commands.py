@@ -70,7 +70,7 @@ def check_commands(page: Path, folder: Path) -> None:
     for command in commands(page):
         done = run(command, folder, page)
         assert done.returncode == 0, f"{command}\n{done.stdout}\n{done.stderr}"
-        assert done.stderr == "", command
+        assert done.stderr == "", f"{command}\n{done.stderr}"
     files = {name for command in commands(page) for name in re.findall(r"[\w.]+\.(?:mcap|yaml|html|rrd|csv)", command)}
     assert files <= {file.name for file in folder.rglob("*")}
     check_pictures(page, folder)

@@ -12,6 +12,8 @@ import jointscope as js
 from jointscope.graphs.comparison import causal_filter
 from jointscope.graphs.comparison.causal_filter import FilteredStates, filter_around, filter_states
 from jointscope.graphs.comparison.compare import smooth
+from jointscope.graphs.kernels import filter_kernel
+from jointscope.graphs.problem.sensor_placement import Placed
 
 DIFFERENT = 1e-4  # [sigma]
 
@@ -45,6 +47,38 @@ def test_where_rounds_do_not_settle_the_filter_runs_tick_by_tick(solved, monkeyp
     monkeypatch.setattr(causal_filter, "_tick_by_tick", lambda *args: asked.append(args) or found)
     assert filter_states(problem, calibration, x) is found
     assert len(asked) == 1
+
+
+@pytest.mark.filterwarnings("error")
+def test_steps_that_could_not_be_taken_are_not_read(solved, monkeypatch):
+    """What a run that broke off never wrote may be any number: it is worth neither a warning nor a decision."""
+    problem, x, calibration = solved
+    unwritten = -np.ones((len(x), x.shape[1], x.shape[1]))
+    monkeypatch.setattr(filter_kernel, "filter_steps", lambda *args: (x, unwritten, False))
+    monkeypatch.setattr(causal_filter, "_tick_by_tick", lambda _, begin, __: begin)
+    around = filter_around(problem, x, calibration)
+    np.testing.assert_array_equal(filter_states(problem, calibration, x).mean, around.mean)
+
+
+@pytest.mark.filterwarnings("error")
+def test_linear_steps_begin_at_the_first_state_that_is_known(solved):
+    """Of the states before the first sample nothing is known, which is no reason to run all others tick by tick."""
+    problem, x, calibration = solved
+    sensors = problem.robot.sensors
+    later = [_without(one, one.ticks == 0) for one in problem.placed if one.factor.name in sensors]
+    behind = replace(problem, placed=tuple(later))
+    begin = filter_around(behind, x, calibration)
+    assert not np.any(np.isfinite(begin.covariance[0]))
+    known = int(np.argmax(np.isfinite(begin.covariance[:, 0, 0])))
+    found = causal_filter._settled(behind, begin, calibration)
+    assert found is not None
+    assert np.all(np.isfinite(found.mean[known:]))
+    assert np.all(np.isfinite(found.covariance[known:]))
+
+
+def _without(placed: Placed, dropped: np.ndarray) -> Placed:
+    kept = np.flatnonzero(~dropped)
+    return Placed(placed.factor.select(kept), placed.ticks[kept], placed.times[kept])
 
 
 @pytest.mark.slow
