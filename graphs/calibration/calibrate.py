@@ -44,7 +44,7 @@ from jointscope.graphs.problem.standstill import leaving_standstill_out
 from jointscope.graphs.problem.step_errors import inertia_shifts
 from jointscope.graphs.problem.windows import windows_of
 from jointscope.graphs.scoring.drive_timing import drive_timing
-from jointscope.graphs.scoring.lacking_effects import lacking_effects
+from jointscope.graphs.scoring.lacking_effects import Suspects, lacking_effects
 from jointscope.graphs.scoring.regression.asked_by_regression import asked_by_regression
 from jointscope.graphs.scoring.score_test import ScoreTest
 from jointscope.graphs.scoring.torque_readings import torque_readings
@@ -53,7 +53,7 @@ from jointscope.graphs.screening.screen_all import screen_all
 from jointscope.graphs.solving.batch_solver import Progress, Solver, solve
 from jointscope.graphs.solving.estimate import Estimate
 from jointscope.graphs.solving.set_problem import SetProblem
-from jointscope.graphs.solving.solver_context import in_solver_context
+from jointscope.graphs.solving.solver_context import give_back_memory, in_solver_context
 from jointscope.graphs.starts.drive_signal import told_drive_signal
 from jointscope.graphs.starts.initial_guess import initial_biases, initial_dynamics, initial_states
 from jointscope.graphs.starts.second_opinion import on_their_word, regressed_values
@@ -120,6 +120,7 @@ def calibrate(
         anew = _calibrated(held(robot, turned), recordings, False, None, standstill, solver, sets, memory, report)
         result = released(robot, anew, turned)
     report("done", 1.0)
+    give_back_memory()
     return replace(result, wall_seconds=time.perf_counter() - started)
 
 
@@ -201,8 +202,13 @@ def _asked_for_causes(
     result: CalibrationResult, solved: Solved, stage: WholeStage | None, recordings: Sequence[Recording]
 ) -> CalibrationResult:
     """With what a linear step says of late signals, of masses and, with a stage to try more, of the whole catalogue."""
+    suspects = Suspects.of(solved.robot) if stage else None
+    if suspects is not None and (windows := tested_on_windows(solved)) is not None:
+        suspects = suspects.left_by(windows)
+        windows = None  # it is large, and so is the test of all samples
+        give_back_memory()
     test = ScoreTest.of(*solved.of_motions, solved.eliminations)
-    lacking = lacking_effects(test, tested_on_windows(solved)) if stage else ()
+    lacking = lacking_effects(test, suspects) if suspects is not None else ()
     smoothed = lacking_filter(stage, solved) if stage else None
     if smoothed is not None and smoothed.moved(result.found):
         lacking = (smoothed, *(other for other in lacking if other.effect != smoothed.effect))

@@ -79,28 +79,49 @@ class LackingEffect:
         return {n: d / abs(found[n].value) for n, d in told.items() if abs(d) > MOVED * abs(found[n].value)}
 
 
-def lacking_effects(test: ScoreTest, windows: ScoreTest | None = None) -> tuple[LackingEffect, ...]:
+@dataclass(frozen=True)
+class Suspects:
+    """What is asked for after a calibration.
+
+    Attributes:
+        hypotheses: not ruled out yet.
+        tried: how many there were, with those that a part of the samples ruled out.
+    """
+
+    hypotheses: Sequence[EffectHypothesis]
+    tried: int
+
+    @staticmethod
+    def of(robot: Robot) -> Suspects:
+        """All that needs no model of its own, and no search among many shapes."""
+        if robot.choices.link_dynamics != "model":
+            return Suspects((), 0)
+        asked = hypotheses_of(robot)
+        asked = [h for h in asked if not (isinstance(h.here.effect, Structure) and h.here.effect.form in SLOW_FORMS)]
+        shapes = Counter(h.label for h in asked)
+        asked = [h for h in asked if shapes[h.label] <= MOST_SHAPES]
+        return Suspects(asked, len(asked))
+
+    def left_by(self, windows: ScoreTest) -> Suspects:
+        """Those whose score on a part of the samples is more than what nine of ten absent effects have there."""
+        scores = windows.each(self.hypotheses)
+        return Suspects([s.hypothesis for s in scores if chdtrc(s.dof, s.score) < FEW], self.tried)
+
+
+def lacking_effects(test: ScoreTest, suspects: Suspects) -> tuple[LackingEffect, ...]:
     """Effects that a solved calibration asks for, surest first; few, or none.
 
     Args:
         test: of the whole recordings, linearised at their solution with the noise used.
-        windows: of a part of them, which rules out most hypotheses at a part of the price.
+        suspects: what is asked for.
     """
-    robot = test.robot
-    hypotheses = _hypotheses(robot)
-    if robot.choices.link_dynamics != "model" or not hypotheses:
+    if not suspects.hypotheses:
         return ()
-    asked = hypotheses if windows is None else _not_ruled_out(windows, hypotheses)
-    best, tried = best_shapes(test.each(asked)).values(), len(hypotheses)
+    best, tried = best_shapes(test.each(suspects.hypotheses)).values(), suspects.tried
     seen = [s for s in best if s.plausible[0] == s.score and tried * chdtrc(s.dof, s.score) < BY_CHANCE]
     seen = sorted(seen, key=lambda score: -score.score)[:MOST]
     steps = zip(test.steps([score.hypothesis for score in seen]), seen, strict=True)
     return _leaders([_lacking(test, step, tried, s.worth(test.seconds)) for step, s in steps if _is_possible(step)])
-
-
-def _not_ruled_out(test: ScoreTest, hypotheses: Sequence[EffectHypothesis]) -> list[EffectHypothesis]:
-    """Those whose score on a part of the samples is more than what nine of ten absent effects have there."""
-    return [s.hypothesis for s in test.each(hypotheses) if chdtrc(s.dof, s.score) < FEW]
 
 
 def _leaders(found: Sequence[LackingEffect]) -> tuple[LackingEffect, ...]:
@@ -112,14 +133,6 @@ def _leaders(found: Sequence[LackingEffect]) -> tuple[LackingEffect, ...]:
     groups = {owner: of_all if owner == ROBOT else p for owner, p in surest.items()}
     kept = [effect for effect in found if effect.p_value <= AS_SURE * groups[effect.owner]]
     return tuple(sorted(kept, key=lambda effect: (groups[effect.owner], -effect.worth)))
-
-
-def _hypotheses(robot: Robot) -> list[EffectHypothesis]:
-    """What is asked for: all that needs no model of its own, and no search among many shapes."""
-    asked = hypotheses_of(robot)
-    asked = [h for h in asked if not (isinstance(h.here.effect, Structure) and h.here.effect.form in SLOW_FORMS)]
-    shapes = Counter(h.label for h in asked)
-    return [h for h in asked if shapes[h.label] <= MOST_SHAPES]
 
 
 def _is_possible(step: HypothesisStep) -> bool:

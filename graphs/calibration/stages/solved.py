@@ -18,6 +18,7 @@ from jointscope.graphs.solving.banded_solver import Elimination, eliminations_of
 from jointscope.graphs.solving.batch_solver import Solution
 from jointscope.graphs.solving.posterior import StateSpread, posteriors
 from jointscope.graphs.solving.set_problem import Problem, SetProblem
+from jointscope.graphs.solving.solver_context import give_back_memory
 from jointscope.robots.model.robot import Robot
 from jointscope.robots.parts.sensors import LinkEncoder, MotorEncoder
 
@@ -72,6 +73,7 @@ class Solved:
         """Uncertainties and one pass over all residuals."""
         every: list[Problem] = [*problems, *sets]
         motions = len(problems)
+        give_back_memory()  # the solver's
         eliminations = eliminations_of(every, solution.estimate)
         found, covariance = posteriors(every, solution, hold, eliminations)
         evidence = NoiseEvidence.empty(problems[0].robot.layout.n_rates)

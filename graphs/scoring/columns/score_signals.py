@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -12,6 +13,8 @@ from numpy.typing import NDArray
 from jointscope.factors.calibration import Calibration
 from jointscope.factors.simpson_dynamics import SimpsonDynamics
 from jointscope.graphs.problem.bag_problem import BagProblem
+from jointscope.graphs.solving.normal_equations import CHUNK
+from jointscope.robots.dynamics.accelerations import Accelerations
 from jointscope.robots.dynamics.carried_weight import CarriedWeight
 from jointscope.robots.dynamics.elastic_joints import ElasticJoints
 from jointscope.robots.dynamics.transmission import Transmission, is_behind
@@ -93,7 +96,8 @@ class ScoreSignals:
         ends = [model.accelerations(part, own, p, sliding) for part, own, sliding in parts]
         assert isinstance(dynamics, SimpsonDynamics)
         middle, sliding = dynamics.middle(x[:-1], x[1:], *ends), steps.throughout
-        found = model.with_derivatives(middle, u, p, None, sliding).by_state[:, :, model.layout.rates]
+        parts_there = _differentiated(model, middle, u, p, sliding)
+        found = np.concatenate([part.by_state[:, :, model.layout.rates] for part in parts_there])
         times = 0.5 * (ticks[:-1] + ticks[1:])
         return ScoreSignals._at(problem, times, middle, u, calibration, sliding), found
 
@@ -109,7 +113,11 @@ class ScoreSignals:
         """From states with the command that acts at each, shape (m + 1, n)."""
         model, parameters = problem.dynamics.model, calibration.values
         values, layout = model.named(parameters), model.layout
-        here = model.with_derivatives(x, u, parameters, None, sliding)
+        a_link, M_inverse, response = [], [], []
+        for part in _differentiated(model, x, u, parameters, sliding):
+            a_link.append(part.value[:, : layout.n_link])
+            M_inverse.append(part.rigid.by_torque)
+            response.append(model.command_response(part, parameters))
         springs, transmission = model.springs(x, values), Transmission.of(problem.robot)
         weight = CarriedWeight(problem.robot).torque(x, values)
         return ScoreSignals(
@@ -122,10 +130,10 @@ class ScoreSignals:
             seen=model.seen(x, values),
             torque_map=None if transmission is None else transmission.maps(values)[1],
             rate=np.gradient(x, ticks, axis=0, edge_order=2),
-            a_link=here.value[:, : layout.n_link],
-            M_inverse=here.rigid.by_torque,
+            a_link=np.concatenate(a_link),
+            M_inverse=np.concatenate(M_inverse),
             u=u[:-1],
-            response=model.command_response(here, parameters)[:-1],
+            response=np.concatenate(response)[:-1],
             stiffness=springs.stiffness,
             damping=springs.damping,
             tau_spring=np.where(springs.stiffness > 0.0, springs.torque, weight),
@@ -148,3 +156,12 @@ class ScoreSignals:
         elastic = [layout.joints.index(joint) for joint in layout.motors]
         a[:, n : n + layout.n_motor] = tau[:, n : n + layout.n_motor] / self.inertia[elastic]
         return a
+
+
+def _differentiated(
+    model: ElasticJoints, x: Array, u: Array, parameters: Array, sliding: Array | None
+) -> Iterator[Accelerations]:
+    """Accelerations with derivatives, some ticks at a time: of all they are a fifth of a gigabyte for each minute."""
+    for first in range(0, len(x), CHUNK):
+        own = slice(first, first + CHUNK)
+        yield model.with_derivatives(x[own], u[own], parameters, None, None if sliding is None else sliding[own])

@@ -10,7 +10,9 @@ from linearised_motion import base
 from jointscope.factors.dynamics import DynamicsFactor
 from jointscope.factors.priors import shared_priors
 from jointscope.graphs.discovery.scored_candidates import _placebos
+from jointscope.graphs.scoring.columns import score_signals
 from jointscope.graphs.scoring.columns.hypotheses import hypotheses_of
+from jointscope.graphs.scoring.columns.score_signals import ScoreSignals
 from jointscope.graphs.scoring.order_scan import scan_orders
 from jointscope.graphs.scoring.score_columns import regressors_of
 from jointscope.graphs.scoring.score_system import Segment, rows_of
@@ -34,6 +36,18 @@ def short():
     """Sixty milliseconds: 61 states of 12 fit into a dense matrix."""
     segment, x = base("doggy", seconds=0.06)
     return segment, x
+
+
+def test_signals_of_some_ticks_at_a_time_are_those_of_all(short, monkeypatch):
+    segment, x = short
+    asked = (segment.problem, x, segment.calibration)
+    whole, (middle, by_rates) = ScoreSignals.of(*asked), ScoreSignals.between(*asked)
+    monkeypatch.setattr(score_signals, "CHUNK", 7)
+    parts, (middle_parts, by_rates_parts) = ScoreSignals.of(*asked), ScoreSignals.between(*asked)
+    np.testing.assert_array_equal(by_rates_parts, by_rates)
+    for one, other in ((parts, whole), (middle_parts, middle)):
+        for name in ("a_link", "M_inverse", "response"):
+            np.testing.assert_array_equal(getattr(one, name), getattr(other, name))
 
 
 def dense(segment, x, hypothesis):

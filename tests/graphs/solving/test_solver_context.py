@@ -4,12 +4,21 @@
 from __future__ import annotations
 
 import pickle
+import platform
 import threading
+from pathlib import Path
 
 import numpy as np
 import pytest
 
-from jointscope.graphs.solving.solver_context import LIMITS, available_cores, side_by_side, thread_count, work_alone
+from jointscope.graphs.solving.solver_context import (
+    LIMITS,
+    available_cores,
+    give_back_memory,
+    side_by_side,
+    thread_count,
+    work_alone,
+)
 
 
 @pytest.mark.parametrize("threads", [1, 2, 3])
@@ -81,3 +90,23 @@ def test_each_thread_has_a_workspace_of_its_own(doggy):
 
     assert len({id(data) for data in (*side_by_side(workspace, range(2), 2), doggy.tree.own.data)}) == 3
     assert pickle.loads(pickle.dumps(doggy.tree.own)).model == doggy.tree.own.model
+
+
+@pytest.mark.skipif(not Path("/proc/self/statm").exists() or platform.libc_ver()[0] != "glibc", reason="needs glibc")
+def test_freed_memory_goes_back_to_the_system():
+    """Pieces that are freed between others that stay: without the call the C library keeps all of them."""
+
+    def resident():
+        return int(Path("/proc/self/statm").read_text().split()[1]) * 4096
+
+    def left(call):
+        pieces = [np.ones(12_000) for _ in range(2000)]  # 96 kB each: below the size that is mapped on its own
+        kept = pieces[::10]
+        pieces.clear()
+        call()
+        return resident(), kept
+
+    before, kept = left(lambda: None)
+    give_back_memory()
+    assert resident() < before - 50e6
+    assert len(kept) == 200
