@@ -58,7 +58,9 @@ class Coupling:
     @property
     def pasted(self) -> str:
         """The section as a robot file has it."""
-        rows = ", ".join(f"[{', '.join(self._digits(i, j) for j in range(len(row)))}]" for i, row in enumerate(self.matrix))
+        rows = ", ".join(
+            f"[{', '.join(self._digits(i, j) for j in range(len(row)))}]" for i, row in enumerate(self.matrix)
+        )
         return f"transmission: {{matrix: [{rows}]}}"
 
     def _digits(self, i: int, j: int) -> str:
@@ -77,13 +79,14 @@ class Coupling:
         if not others:
             return None
         said = ", ".join(
-            f"{self.element(i, j)} is {self.matrix[i, j]:.6g} +- {self.sigmas[i, j]:.2g} (file: {self.stated[i, j]:.6g})"
+            f"{self.element(i, j)} is {self.matrix[i, j]:.6g} +- {self.sigmas[i, j]:.2g} "
+            f"(file: {self.stated[i, j]:.6g})"
             for i, j in others
         )
         where = ", ".join(r.path for fit in self.fits for r in fit.readings)
         return (
-            f"{where}: the transmission of {robot_argument(self.robot)} is not that of its locked springs: {said}; write "
-            f"`{self.pasted}` (joint angles = matrix times motor angles)"
+            f"{where}: the transmission of {robot_argument(self.robot)} is not that of its locked springs: {said}; "
+            f"write `{self.pasted}` (joint angles = matrix times motor angles)"
         )
 
     def to_json(self) -> dict[str, Any]:
@@ -170,7 +173,8 @@ def find_coupling(robot: Robot, readings: Sequence[LockedReadings]) -> Coupling:
         RecordingError: a spring deflects that is said to be locked, or no transmission is like that.
     """
     stated = stated_matrix(robot)
-    A, fits = np.linalg.inv(stated), []
+    A: Array = np.asarray(np.linalg.inv(stated), dtype=np.float64)
+    fits = []
     variance = np.zeros((robot.n,) * 4)  # of elements of A, without zeros and delays
     for joints in dict.fromkeys(r.joints for r in readings):
         some = [r for r in readings if r.joints == joints]
@@ -187,7 +191,7 @@ def find_coupling(robot: Robot, readings: Sequence[LockedReadings]) -> Coupling:
             f"{readings[0].path}: motors and links do not determine each other (singular matrix); check names, signs "
             f"and units of both encoders in {robot_argument(robot)}"
         )
-    T = np.linalg.inv(A)
+    T: Array = np.asarray(np.linalg.inv(A), dtype=np.float64)
     T[np.abs(T) < NOTHING * np.abs(T).max()] = 0.0
     # T changes by -T dA T
     sigmas = np.sqrt(np.maximum(np.einsum("ia,bj,abcd,ic,dj->ij", T, T, variance, T, T), 0.0))

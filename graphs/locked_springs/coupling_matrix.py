@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The matrix between motors and links from a recording with locked springs alone: values, sigmas, and what is zero.
 
-Total least squares (rigid_rows.py) over the rows of A = T^-1 that locked springs show: there an element is a pulley that
-a rope passes, so what is no pulley is zero. An element that is not significant at ZERO_SIGMAS, by a chi2 test that it
-shares with the others, is held at zero. No ratio is taken to be an integer. Residuals that repeat widen the sigmas.
+Total least squares (rigid_rows.py) over the rows of A = T^-1 that locked springs show: there an element is a pulley
+that a rope passes, so what is no pulley is zero. Elements below ZERO_SIGMAS are held at zero, one after the other, the
+weakest first. No ratio is taken to be an integer. Residuals that repeat widen the sigmas.
 """
 
 from __future__ import annotations
@@ -97,7 +97,7 @@ def fit_coupling(readings: Sequence[LockedReadings], stated: Array) -> CouplingF
 
 def _widened(readings: Sequence[LockedReadings], stated: Array, free: Mask) -> CouplingFit:
     """A fit whose sigmas say what its residuals repeat."""
-    fit = _fitted(readings, stated, free, np.ones(len(stated)), None)
+    fit = _fitted(readings, _regressed(readings, stated, free), free, np.ones(len(stated)), None)
     for _ in range(WIDENINGS):
         widened = fit.widened * _repeats(fit)
         widened = np.maximum(widened, 1.0)
@@ -105,6 +105,17 @@ def _widened(readings: Sequence[LockedReadings], stated: Array, free: Mask) -> C
             break
         fit = _fitted(readings, fit.A, free, widened, fit)
     return fit
+
+
+def _regressed(readings: Sequence[LockedReadings], stated: Array, free: Mask) -> Array:
+    """Rows of A by regression: far off the matrix, total least squares may lead away from it."""
+    motors = np.vstack([r.q_motor - r.q_motor.mean(axis=0) for r in readings])
+    links = np.vstack([r.q_link - r.q_link.mean(axis=0) for r in readings])
+    A = np.array(stated, dtype=np.float64)
+    for k, own in enumerate(free):
+        left = motors[:, k] - links[:, ~own] @ A[k, ~own]
+        A[k, own] = np.linalg.lstsq(links[:, own], left, rcond=None)[0]
+    return A
 
 
 def _repeats(fit: CouplingFit) -> Array:
@@ -146,8 +157,8 @@ def _fitted(
         step = -covariance @ g
         A[free] += step[:count]
         for i in range(len(readings)):
-            own = step[count + i * (k + 1) : count + (i + 1) * (k + 1)]
-            zeros[i], delays[i] = zeros[i] + own[:k], delays[i] + float(own[k])
+            begin = count + i * (k + 1)
+            zeros[i], delays[i] = zeros[i] + step[begin : begin + k], delays[i] + float(step[begin + k])
         if float(np.max(np.abs(step) / np.sqrt(np.maximum(np.diag(covariance), 1e-300)))) < SETTLED:
             break
     residuals = np.vstack([rows.r for rows in parts])
@@ -160,7 +171,8 @@ def _fitted(
 
 def _rows(readings: LockedReadings, A: Array, zero: Array, delay: float, widened: Array) -> RigidRows:
     sigmas = (readings.sigma_motor, readings.sigma_link)
-    return RigidRows.of(readings.q_motor, readings.q_link, readings.v_link, sigmas, widened, A, zero, delay)
+    links = (readings.q_link, readings.v_link, readings.a_link)
+    return RigidRows.of(readings.q_motor, links, sigmas, widened, A, zero, delay)
 
 
 def _derivatives(rows: RigidRows, free: Mask) -> Array:
@@ -173,5 +185,3 @@ def _derivatives(rows: RigidRows, free: Mask) -> Array:
     J[:, np.arange(k), len(places) + np.arange(k)] = -1.0
     J[:, :, -1] = rows.turned
     return J
-
-

@@ -2,8 +2,8 @@
 """Springs that are said to be locked, and deflect: a law of rigid motors does not hold, or torque turns them.
 
 A deflection of a spring under weight goes with the angles and looks like a coupling; so the torque that the weight of
-the links puts on each rope, T^T g(q), stands beside the angles. A clamp may give way a little: a share of the spring's
-own compliance is let pass, and what repeats of it widens the sigmas.
+the links puts on each rope, T^T g(q), stands beside the angles. A clamp may give way by a small share of the spring's
+own compliance: the matrix is wrong by as much as that looks like a coupling, and no sigma says so.
 """
 
 from __future__ import annotations
@@ -43,8 +43,8 @@ def check_locked(fit: CouplingFit, robot: Robot) -> None:
                 amount = max(span if yields else 0.0, 2.0 * float(np.quantile(np.abs(r[:, k]), 0.99)))
                 raise RecordingError(
                     f"{readings.path}: the spring of {joint} is said to be locked, but deflects by {amount:.2g} {unit} "
-                    f"of its motor (residual {rms:.2g} {unit} rms, encoders explain {explained:.2g} {unit}); lock it, or "
-                    f"name the others as `locked_springs: [JOINT, ...]` in {robot_argument(robot)}"
+                    f"of its motor (residual {rms:.2g} {unit} rms, encoders explain {explained:.2g} {unit}); lock it, "
+                    f"or name the others as `locked_springs: [JOINT, ...]` in {robot_argument(robot)}"
                 )
 
 

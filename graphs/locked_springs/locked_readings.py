@@ -11,6 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.interpolate import PchipInterpolator
 
 from jointscope.robots.errors import RecordingError
 from jointscope.robots.model.command_words import robot_argument
@@ -38,7 +39,7 @@ class LockedReadings:
         times: of the instants, shape (m,) [s].
         q_motor: motor encoders of these joints, shape (m, k) [rad].
         q_link: link encoders of all joints, shape (m, n) [rad].
-        v_link: speed of the links, shape (m, n) [rad/s].
+        v_link, a_link: speed [rad/s] and acceleration [rad/s^2] of the links, shape (m, n).
         sigma_motor, sigma_link: of the encoders, shape (k,) and (n,) [rad].
         still: joints that stand, whose columns nothing tells, shape (n,).
     """
@@ -51,6 +52,7 @@ class LockedReadings:
     q_motor: Array
     q_link: Array
     v_link: Array
+    a_link: Array
     sigma_motor: Array
     sigma_link: Array
     still: NDArray[np.bool_]
@@ -80,14 +82,15 @@ class LockedReadings:
         motors, links = recording.streams[robot.motor_encoder.name].whole, recording.streams[link.name].whole
         sigma_motor, sigma_link = robot.motor_encoder.sigmas[rows], link.sigmas
         times = _common_times(motors, links)
-        q_motor = _at(motors, times)[:, rows] - robot.motor_encoder.zero[rows]
-        q_link = _at(links, times) - link.zero
         half = max(HALF_WINDOW, 2.0 * float(np.median(np.diff(links.times))) if len(links) > 1 else 0.0)
-        v_link = (_at(links, times + half) - _at(links, times - half)) / (2.0 * half)
+        times = times[(times > links.times[0] + half) & (times < links.times[-1] - half)] if len(times) else times
+        q_motor = _at(motors, times)[:, rows] - robot.motor_encoder.zero[rows]
+        before, q_link, after = (_at(links, times + shift) - link.zero for shift in (-half, 0.0, half))
+        v_link, a_link = (after - before) / (2.0 * half), (after - 2.0 * q_link + before) / half**2
         kept = _news(np.hstack([q_motor, q_link]), STEP * np.concatenate([sigma_motor, sigma_link]))
         found = LockedReadings(
-            recording.path, recording.sha256, joints, rows, times[kept], q_motor[kept], q_link[kept], v_link[kept],
-            sigma_motor, sigma_link, np.zeros(robot.n, bool),
+            recording.path, recording.sha256, joints, rows, times[kept], q_motor[kept], q_link[kept],
+            v_link[kept], a_link[kept], sigma_motor, sigma_link, np.zeros(robot.n, bool),
         )  # fmt: skip
         return found._with_still(robot)
 
@@ -105,8 +108,8 @@ class LockedReadings:
             place = robot.joints.index(standing[0])
             raise RecordingError(
                 f"{self.path}: {', '.join(standing)} {'stands' if len(standing) == 1 else 'stand'} still "
-                f"({standing[0]} spans {span[place]:.2g} {robot.unit_at(standing[0], 'rad')}) though the spring is said "
-                "to be locked; move every such joint, or name the others as `locked_springs: [JOINT, ...]` in "
+                f"({standing[0]} spans {span[place]:.2g} {robot.unit_at(standing[0], 'rad')}) though the spring is "
+                "said to be locked; move every such joint, or name the others as `locked_springs: [JOINT, ...]` in "
                 f"{robot_argument(robot)}"
             )
         if len(self) < needed:
@@ -128,7 +131,10 @@ def _common_times(motors: Stream, links: Stream) -> Array:
 
 
 def _at(stream: Stream, times: Array) -> Array:
-    return np.column_stack([np.interp(times, stream.times, column) for column in stream.values.T])
+    """A stream between its samples; straight lines would cut the corners of each turn to the same side."""
+    if len(stream) < 2 or not len(times):
+        return np.zeros((len(times), stream.values.shape[1]))
+    return np.asarray(PchipInterpolator(stream.times, stream.values, axis=0)(times))
 
 
 def _news(readings: Array, steps: Array) -> NDArray[np.intp]:

@@ -3,8 +3,8 @@
 
     encoder of motor j = theta_j,    theta_j = (T^-1 q)_j + z_j    rigid_rows.py; no states are left
 
-Instead of a spring there is a constraint: nothing about stiffness enters. Zeros and the delay of the links' encoders are
-the recording's own; effects on encoders act as in every other kind.
+Instead of a spring there is a constraint: nothing about stiffness enters. Zeros and the delay of the links' encoders
+are the recording's own; effects on encoders act as in every other kind.
 """
 
 from __future__ import annotations
@@ -75,8 +75,8 @@ class LockedSet:
         of_motors = self._motor_errors(values, links @ A.T)
         sigmas = (found.sigma_motor, found.sigma_link)
         rows = RigidRows.of(
-            found.q_motor - of_motors.value[:, found.rows], links, found.v_link, sigmas, self.widened,
-            A[found.rows], own[:-1], float(own[-1]),
+            found.q_motor - of_motors.value[:, found.rows], (links, found.v_link, found.a_link), sigmas,
+            self.widened, A[found.rows], own[:-1], float(own[-1]),
         )  # fmt: skip
         J = np.zeros((*rows.r.shape, calibration.size))
         by_value = np.zeros((*rows.r.shape, len(calibration.names)))

@@ -2,8 +2,8 @@
 """Motors that follow links rigidly, with noise on both sides: the likelihood of total least squares, links eliminated.
 
     theta = A q + z                     of the k motors whose springs are locked; A are rows of T^-1, z unknown zeros
-    q_m = q - d q' + noise              links' encoders may be late by d
-    r = theta_m - A (q_m + d q') - z    has the covariance  S = D (S_motor + A S_link A^T) D
+    q_m = q(t - d) + noise              links' encoders may be late by d
+    r = theta_m - A (q_m + d q_m' + d^2 q_m'' / 2) - z    has the covariance  S = D (S_motor + A S_link A^T) D
     cost = sum of r^T S^-1 r / 2        is that of all q at their best values, with its exact gradient
 
 The gradient by A is -S^-1 r q^T, where q are the links at these values. D, at least one, widens what encoders explain
@@ -40,28 +40,28 @@ class RigidRows:
 
     @staticmethod
     def of(
-        motors: Array, links: Array, speeds: Array, sigmas: tuple[Array, Array], widened: Array,
+        motors: Array, links: tuple[Array, Array, Array], sigmas: tuple[Array, Array], widened: Array,
         A: Array, zero: Array, delay: float,
     ) -> RigidRows:  # fmt: skip
         """Residuals and what their derivatives are made of.
 
         Args:
             motors: readings, shape (m, k) [rad].
-            links: readings, shape (m, n) [rad].
-            speeds: of the links, shape (m, n) [rad/s].
+            links: readings [rad], speeds [rad/s] and accelerations [rad/s^2], shape (m, n) each.
             sigmas: of motors (k,) and links (n,) [rad].
             widened: D, shape (k,).
             A: shape (k, n).
             zero: z, shape (k,) [rad].
             delay: d [s].
         """
-        y = links + delay * speeds
+        readings, speeds, accelerations = links
+        y = readings + delay * speeds + 0.5 * delay**2 * accelerations
         r = motors - y @ A.T - zero
         S = np.outer(widened, widened) * (np.diag(sigmas[0] ** 2) + (A * sigmas[1] ** 2) @ A.T)
-        W = np.linalg.inv(S)
+        W: Array = np.asarray(np.linalg.inv(S), dtype=np.float64)
         shift = ((r @ W) * widened) @ A * sigmas[1] ** 2
         q = y[:, None, :] + widened[:, None] * shift[:, None, :]
-        return RigidRows(r, W, S, q, -speeds @ A.T)
+        return RigidRows(r, W, S, q, -(speeds + delay * accelerations) @ A.T)
 
     @property
     def cost(self) -> float:

@@ -58,8 +58,8 @@ def unstretched_springs(recording: Recording, robot: Robot) -> list[Notice]:
     if not found:
         return []
     said = ", ".join(
-        f"{joint} (motor and link agree within {seen:.2g} {robot.unit_at(joint, 'rad')}, weight alone would stretch it by "
-        f"{expected:.2g} {robot.unit_at(joint, 'rad')})"
+        f"{joint} (motor and link agree within {seen:.2g} {robot.unit_at(joint, 'rad')}, weight alone would stretch it "
+        f"by {expected:.2g} {robot.unit_at(joint, 'rad')})"
         for joint, (seen, expected) in found.items()
     )
     command = (
@@ -67,8 +67,8 @@ def unstretched_springs(recording: Recording, robot: Robot) -> list[Notice]:
         f"-o {edited_argument(robot, 'coupled')}"
     )
     text = (
-        f"springs do not deflect: {said}; if they were locked, this is no recording of motion: {command}; else they are "
-        "far stiffer than the robot file says"
+        f"springs do not deflect: {said}; if they were locked, this is no recording of motion: {command}; else they "
+        "are far stiffer than the robot file says"
     )
     return [Notice(link.name, UNSTRETCHED, len(found), text)]
 

@@ -16,22 +16,24 @@ from typing import Any
 from jointscope.robots.errors import RobotError
 from jointscope.robots.model.command_words import robot_argument
 from jointscope.robots.model.robot import Robot
-from jointscope.robots.yaml_section import did_you_mean
+from jointscope.robots.yaml_section import Section, did_you_mean
 
 KEY = "locked_springs"
 BAGS = (".bag", ".db3", ".mcap")
 
 
-def check_locked_springs(content: Any, robot: Robot) -> None:
-    """The section names joints of the robot that have springs.
+def check_locked_springs(top: Section, robot: Robot) -> None:
+    """The section names joints of the robot that have springs; it is the last one of a file that is asked for.
 
     Args:
-        content: of the section; None where there is none.
+        top: the whole file.
         robot: whose file it is.
 
     Raises:
-        RobotError: neither a list nor lists by recording, no such joint, or a joint without a spring.
+        RobotError: neither a list nor lists by recording, no such joint, or a joint without a spring; unknown keys.
     """
+    content = top.raw(KEY)
+    top.finish()
     if content is None:
         return
     place = f"{robot.path.name}: {KEY}"

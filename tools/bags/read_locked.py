@@ -29,9 +29,7 @@ def read_locked(path: str | Path, robot: Robot) -> LockedReadings:
     robot.need_motion()
     joints = locked_in(robot, path)
     encoders = {s.name: s for s in (robot.motor_encoder, robot.link_encoder) if s is not None}
-    return LockedReadings.of(
-        read_recording(path, replace(robot, sensors=encoders), locked_springs=True), robot, joints
-    )
+    return LockedReadings.of(read_recording(path, replace(robot, sensors=encoders), locked_springs=True), robot, joints)
 
 
 def read_coupling(paths: Sequence[str | Path], robot: Robot) -> Coupling:

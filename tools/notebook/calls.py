@@ -27,8 +27,8 @@ from jointscope.graphs.transmission.diagnose_links import diagnose_links
 from jointscope.graphs.transmission.discover_links import discover_links
 from jointscope.robots.errors import RecordingError, SolveError
 from jointscope.tools.acceptance.evaluation import check_models
-from jointscope.tools.bags.read_locked import read_coupling
 from jointscope.tools.bags.needed_streams import check_same_streams
+from jointscope.tools.bags.read_locked import read_coupling
 from jointscope.tools.notebook.given import (
     AnyLimits,
     AnyRecording,

@@ -12,7 +12,6 @@ from jointscope.tools.terminal.text_table import text_table
 
 def coupling_text(found: Coupling) -> str:
     """The matrix of the locked springs alone, element by element, and whether it is that of the file."""
-    joints = found.robot.joints
     lines = []
     for fit in found.fits:
         for i, readings in enumerate(fit.readings):
@@ -20,8 +19,8 @@ def coupling_text(found: Coupling) -> str:
             unit = found.robot.unit_at(readings.joints[worst], "rad")
             lines.append(
                 f"Locked springs in {readings.path} ({', '.join(readings.joints)}): {len(readings)} instants; motors "
-                f"follow links within {significant(fit.rms[worst], 2)} {unit} (rms, {readings.joints[worst]}), encoders "
-                f"explain {significant(fit.explained[worst], 2)} {unit}; link encoders are "
+                f"follow links within {significant(fit.rms[worst], 2)} {unit} (rms, {readings.joints[worst]}), "
+                f"encoders explain {significant(fit.explained[worst], 2)} {unit}; link encoders are "
                 f"{significant(1e3 * fit.delays[i], 2)} ms late"
             )
     rows = []
@@ -32,7 +31,10 @@ def coupling_text(found: Coupling) -> str:
     zero = sum(int((~fit.free & ~fit.readings[0].still).sum()) for fit in found.fits)
     lines += [text_table(["link angle per motor angle", "file", "locked springs", "± sigma"], rows, "<>>>")]
     if zero:
-        lines.append(f"No other joint turns a motor: {zero} further elements of the inverse are zero within 4 sigma, and held there.")
+        lines.append(
+            f"Nothing else turns a motor: {zero} further elements of the inverse are zero within 4 sigma, and held "
+            "there."
+        )
     wrong = found.sentence()
     lines.append(wrong if wrong else "The transmission of the robot file is the one that the locked springs show.")
     return "\n".join(lines)

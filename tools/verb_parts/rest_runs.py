@@ -56,7 +56,10 @@ def run_rest_calibration(
     progress: Progress,
     coupling: Coupling | None = None,
 ) -> tuple[str, AcceptedBy]:
-    """Calibrates from rests, and from locked springs where there are some, writes the files, and returns what the screen says, and which limits are kept.
+    """Calibrates from rests, beside locked springs or alone, and writes the files.
+
+    Returns:
+        What the screen says, and which limits are kept.
 
     Raises:
         RobotError: a viewer recording was asked for.

@@ -82,13 +82,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Calibrates, writes the files, and says what was found."""
-    if args.incremental and args.solver == "samples":
-        raise SolveError("--incremental goes over condensed factors; leave out `--solver samples`")
-    if (args.incremental or args.solver == "samples") and (args.workers > 1 or args.scheduler is not None):
-        raise SolveError(
-            f"{'--incremental' if args.incremental else '--solver samples'} solves in this process alone; leave out "
-            "--workers and --scheduler"
-        )
+    _check_solvers(args)
     files = ResultFiles.of(args)
     check_one_choice(args)
     _check_kinds(args)
@@ -169,6 +163,21 @@ def _still_kinds(
     return partial(run_frequency_calibration, robot, args.frequency, files, limits)
 
 
+def _check_solvers(args: argparse.Namespace) -> None:
+    """Solvers that go together.
+
+    Raises:
+        SolveError: two of them.
+    """
+    if args.incremental and args.solver == "samples":
+        raise SolveError("--incremental goes over condensed factors; leave out `--solver samples`")
+    if (args.incremental or args.solver == "samples") and (args.workers > 1 or args.scheduler is not None):
+        raise SolveError(
+            f"{'--incremental' if args.incremental else '--solver samples'} solves in this process alone; leave out "
+            "--workers and --scheduler"
+        )
+
+
 def _check_kinds(args: argparse.Namespace) -> None:
     """One kind of recording, and what goes with it.
 
@@ -185,8 +194,8 @@ def _check_kinds(args: argparse.Namespace) -> None:
     if args.locked_springs and not args.bags and (args.poses or args.frequency):
         option = "--poses" if args.poses else "--frequency"
         raise RecordingError(
-            f"--locked-springs goes alone, with recordings of motion, or with --rests alone; without motion leave {option} "
-            "out: calibrate the transmission first, then take the file that was written"
+            f"--locked-springs goes alone, with recordings of motion, or with --rests alone; without motion leave "
+            f"{option} out: calibrate the transmission first, then take the file that was written"
         )
     check_one_kind(args.bags, args.poses, args.rests, of_motion, args.frequency, args.locked_springs)
     sample_by_sample = next((option for option in ("--incremental", "--solver samples") if of_motion[option]), None)
