@@ -17,7 +17,7 @@ robots robots.urdf robots.bodies robots.parts robots.effect_kinds robots.model r
 robots.dynamics robots.recordings robots.rests robots.files robots.ready
 factors
 graphs.kernels graphs.problem graphs.solving graphs.workers graphs.spread graphs.gtsam_solvers graphs.noise
-graphs.starts graphs.screening graphs.scoring.columns
+graphs.starts graphs.screening graphs.locked_springs graphs.scoring.columns
 graphs.scoring graphs.scoring.regression graphs.calibration.stages graphs.calibration
 graphs.responses graphs.frequency graphs.rests graphs.rest_search graphs.poses graphs.joint_kinds
 graphs.comparison graphs.refits graphs.judging graphs.discovery graphs.across_kinds graphs.transmission

@@ -14,18 +14,21 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from jointscope.factors.calibration import Calibration
+from jointscope.factors.calibration import DYNAMICS, Calibration
 from jointscope.graphs.calibration.calibration_result import ParameterEstimate
 from jointscope.graphs.calibration.found_values import derived_results, dynamic_parameters
 from jointscope.graphs.rests.band_posterior import band_posterior
 from jointscope.graphs.rests.doubts import AskedOfRests, Doubt
 from jointscope.graphs.rests.rest_errors import RestErrors, rest_errors
 from jointscope.graphs.rests.rest_set import EDGE, RestSet
+from jointscope.graphs.rests.rests_by_values import SaidElsewhere
 from jointscope.graphs.rests.seen_rests import SeenRests
 from jointscope.graphs.rests.settling import settled
 from jointscope.graphs.rests.unnoticed import Unnoticed, unnoticed
 from jointscope.graphs.solving.batch_solver import Progress, Solution, solve
 from jointscope.graphs.solving.estimate import Estimate
+from jointscope.graphs.solving.posterior import posteriors
+from jointscope.graphs.solving.set_problem import SetProblem
 from jointscope.graphs.solving.solver_context import in_solver_context
 from jointscope.robots.errors import SolveError
 from jointscope.robots.model.robot import Robot
@@ -118,7 +121,11 @@ class RestCalibration:
 
 @in_solver_context
 def calibrate_rests(
-    robot: Robot, recordings: Sequence[Rests], progress: Progress | None = None, near: RestSet | None = None
+    robot: Robot,
+    recordings: Sequence[Rests],
+    progress: Progress | None = None,
+    near: RestSet | None = None,
+    beside: Sequence[SetProblem] = (),
 ) -> RestCalibration:
     """Calibrates a robot from rests.
 
@@ -127,15 +134,17 @@ def calibrate_rests(
         recordings: rests of each.
         progress: called with a text and the share done.
         near: rests with the weights to begin with, where the values of the robot are near the end.
+        beside: recordings of kinds without states in the same graph, as those with locked springs.
 
     Raises:
         SolveError: no convergence.
     """
     began, report = time.perf_counter(), progress or (lambda text, share: None)
-    problems, solution, iterations = settled_rests(robot, recordings, report, near)
-    (x,), (likeliest,) = solution.estimate.states, solution.estimate.calibrations
+    problems, solution, iterations = settled_rests(robot, recordings, report, near, beside)
+    x, likeliest = solution.estimate.states[0], solution.estimate.calibrations[0]
     whole = RestSet.joined(problems)
-    calibration, covariance = band_posterior(whole, robot, x, likeliest)
+    said = _said_beside(whole, x, likeliest, beside, solution) if beside else None
+    calibration, covariance = band_posterior(whole, robot, x, likeliest, said)
     sigmas, scale = np.sqrt(np.diag(covariance)), calibration.value_by_coordinate
     table = dynamic_parameters(robot, calibration, sigmas)
     priors = np.array([robot.parameters[p.name].coordinate_sigma for p in table])
@@ -149,7 +158,7 @@ def calibrate_rests(
         p for p, result in zip(derived_results(robot, calibration, covariance), robot.derived, strict=True)
         if set(result.of) <= known
     ]  # fmt: skip
-    asked = AskedOfRests.of(whole, robot, x, likeliest)
+    asked = AskedOfRests.of(whole, robot, x, likeliest, said)
     report("done", 1.0)
     return RestCalibration(
         robot=found,
@@ -171,8 +180,22 @@ def calibrate_rests(
     )
 
 
+def _said_beside(
+    whole: RestSet, x: Array, likeliest: Calibration, beside: Sequence[SetProblem], solution: Solution
+) -> SaidElsewhere:
+    """What the recordings beside and priors say of the values."""
+    place = solution.shared.indices(0)[likeliest.columns[DYNAMICS]]
+    covariance = np.asarray(posteriors([whole, *beside], solution)[1][np.ix_(place, place)])
+    scale = likeliest.value_by_coordinate
+    return SaidElsewhere.of(whole, x, likeliest, covariance * np.outer(scale, scale))
+
+
 def settled_rests(
-    robot: Robot, recordings: Sequence[Rests], report: Progress, near: RestSet | None = None
+    robot: Robot,
+    recordings: Sequence[Rests],
+    report: Progress,
+    near: RestSet | None = None,
+    beside: Sequence[SetProblem] = (),
 ) -> tuple[list[RestSet], Solution, int]:
     """Rests with the weights that they deserve, the solution of all as one set, and the iterations that it took.
 
@@ -181,6 +204,7 @@ def settled_rests(
         recordings: rests of each.
         report: called with a text and the share done.
         near: rests with the weights to begin with, where the values of the robot are near the end.
+        beside: as of `calibrate_rests`.
 
     Raises:
         SolveError: no convergence, or a friction that ran away.
@@ -189,7 +213,7 @@ def settled_rests(
     attempts = ((False, False), (False, True), (True, False), (True, True))
     for scoring, links_first in attempts:
         try:
-            return _settled(robot, recordings, report, near, links_first, scoring)
+            return _settled(robot, recordings, report, near, links_first, scoring, beside)
         except SolveError:
             if (scoring, links_first) == attempts[-1]:
                 raise
@@ -197,7 +221,13 @@ def settled_rests(
 
 
 def _settled(
-    robot: Robot, recordings: Sequence[Rests], report: Progress, near: RestSet | None, links_first: bool, scoring: bool
+    robot: Robot,
+    recordings: Sequence[Rests],
+    report: Progress,
+    near: RestSet | None,
+    links_first: bool,
+    scoring: bool,
+    beside: Sequence[SetProblem],
 ) -> tuple[list[RestSet], Solution, int]:
     """The same from one beginning: bands at once, or links in equilibrium before them."""
     problems = [replace(RestSet.of(robot, rests), scoring=scoring) for rests in recordings]
@@ -205,12 +235,12 @@ def _settled(
         weights = near.repeatability, near.per_command
         problems = [replace(problem, repeatability=weights[0], per_command=weights[1]) for problem in problems]
     whole, edges = RestSet.joined(problems), EDGES if near is None else EDGES[-1:]
-    x, calibration = whole.start(Calibration.of(robot))
-    estimate, iterations = Estimate((x,), (calibration,)), 0
+    begun = [problem.start(Calibration.of(robot)) for problem in (whole, *beside)]
+    estimate, iterations = Estimate(tuple(x for x, _ in begun), tuple(at for _, at in begun)), 0
     if links_first:
         nothing = np.zeros_like(whole.rests.creep)
         links = replace(whole, rests=replace(whole.rests, moved=nothing.astype(bool), creep=nothing))
-        solution = solve([links], estimate, max_iterations=MOST_ITERATIONS)
+        solution = solve([links, *beside], estimate, max_iterations=MOST_ITERATIONS)
         estimate, iterations = solution.estimate, len(solution.iterations)
 
     def converged(k: int, rests: RestSet, solution: Solution) -> None:
@@ -222,7 +252,7 @@ def _settled(
                 "look at what `jointscope compare ROBOT --rests BAG` says"
             )
 
-    found = settled(whole, estimate, MOST_ITERATIONS, edges, converged)
+    found = settled(whole, estimate, MOST_ITERATIONS, edges, converged, beside)
     whole, solution = found.rests, found.solution
     check_bands(whole, solution.estimate.states[0], solution.estimate.calibrations[0])
     weighed = [replace(problem, repeatability=whole.repeatability, edge=whole.edge) for problem in problems]

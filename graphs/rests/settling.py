@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from jointscope.graphs.rests.rest_set import EDGE, RestSet
 from jointscope.graphs.solving.batch_solver import Solution, solve
 from jointscope.graphs.solving.estimate import Estimate
+from jointscope.graphs.solving.set_problem import SetProblem
 
 Array = NDArray[np.float64]
 PASSES = 6  # of the repeatability
@@ -43,15 +44,17 @@ def settled(
     most_iterations: int,
     edges: Sequence[float] = (EDGE,),
     each: Callable[[int, RestSet, Solution], None] | None = None,
+    beside: Sequence[SetProblem] = (),
 ) -> Settled:
     """Solves with edges that become sharp, until the repeatability agrees with the residuals.
 
     Args:
         rests: with the model and the weights to begin with.
-        estimate: where to begin.
+        estimate: where to begin: the rests, then those beside.
         most_iterations: of each stage.
         edges: blur of the bands' edges, stage by stage.
         each: called with the number of each stage, its rests and its solution; may raise to end the search.
+        beside: recordings of other kinds in the same graph.
 
     Raises:
         SolveError: the fit ran away.
@@ -59,7 +62,7 @@ def settled(
     iterations, stages = 0, (*edges, *[EDGE] * PASSES)
     for k, edge in enumerate(stages):
         rests = replace(rests, edge=edge)
-        solution = solve([rests], estimate, max_iterations=most_iterations)
+        solution = solve([rests, *beside], estimate, max_iterations=most_iterations)
         estimate, iterations = solution.estimate, iterations + len(solution.iterations)
         if each is not None:
             each(k, rests, solution)
@@ -73,6 +76,6 @@ def settled(
 
 def repeatability_of(whole: RestSet, solution: Solution) -> Array:
     """Factor on the sigmas of the link encoders that the residuals ask for, at least 1, shape (n,)."""
-    (x,), (calibration,) = solution.estimate.states, solution.estimate.calibrations
+    x, calibration = solution.estimate.states[0], solution.estimate.calibrations[0]
     size = np.sqrt(np.mean(whole.residuals(x, whole.model.named(calibration.values)) ** 2, axis=0))
     return np.maximum(whole.repeatability * size, 1.0)

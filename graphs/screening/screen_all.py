@@ -12,6 +12,7 @@ from jointscope.graphs.screening.mistaken_hold import MISTAKEN_HOLD, mistaken_ho
 from jointscope.graphs.screening.mistaken_torque_sensors import MISTAKEN_TORQUE, mistaken_torque_sensors
 from jointscope.graphs.screening.mistaken_transmission import MISTAKEN_TRANSMISSION, mistaken_transmission
 from jointscope.graphs.screening.saturated_drives import SATURATION, saturated_drives
+from jointscope.graphs.screening.unstretched_springs import UNSTRETCHED, unstretched_springs
 from jointscope.robots.model.robot import Robot
 from jointscope.robots.recordings.imu_plausibility import MIRRORED
 from jointscope.robots.recordings.recording import Notice, Recording
@@ -28,6 +29,7 @@ PLAIN_MISTAKES = (
     MISTAKEN_TORQUE,
     MISTAKEN_TRANSMISSION,
     MISTAKEN_HOLD,
+    UNSTRETCHED,
 )
 """Kinds of notices that say what is wrong in a robot file, or that a recording is one of two robots."""
 
@@ -60,4 +62,5 @@ def _screened(recording: Recording, robot: Robot) -> list[Notice]:
     odd += mistaken_accelerometers(recording, robot)
     odd += mistaken_torque_sensors(recording, robot)
     odd += mistaken_hold(recording, robot)
+    odd += unstretched_springs(recording, robot)
     return [*odd, *(exchanged_joints(robot, [recording]) or saturated_drives(robot, [recording]))]

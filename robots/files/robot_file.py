@@ -20,6 +20,7 @@ from jointscope.robots.errors import EffectError, RobotError
 from jointscope.robots.files.derived_section import derived_results
 from jointscope.robots.files.effect_catalogue import parse_effect
 from jointscope.robots.files.frequency_section import check_still_parameters, frequency_setup
+from jointscope.robots.files.locked_section import check_locked_springs
 from jointscope.robots.files.noise_section import process_noise
 from jointscope.robots.files.pose_section import pose_setup, with_poses
 from jointscope.robots.files.robot_consistency import check_robot
@@ -114,7 +115,7 @@ def load_robot(name_or_path: str | Path) -> Robot:
     if motion:
         robot = replace(robot, noise=noise_section.build(lambda s: process_noise(s, robot)))
     top.raw("calibration")
-    top.finish()
+    check_locked_springs(top, robot)
     check_robot(robot) if motion else check_still_parameters(robot, parameters)
     return robot
 

@@ -19,6 +19,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from ruamel.yaml.comments import CommentedMap, CommentedSeq
 
 from jointscope.robots.dynamics.transmission import Transmission, elements
 from jointscope.robots.effect_kinds.transmission_elements import FROM
@@ -152,13 +153,22 @@ def element_units(robot: Robot) -> dict[str, str]:
 
 
 def write_transmission(document: Any, robot: Robot) -> None:
-    """Elements that were calibrated, where the file has a matrix."""
-    section = document.get("transmission")
+    """The matrix with elements that were calibrated; one that locked springs showed first gets a section."""
     own, _ = elements(robot)
-    if section is None or not own or robot.transmission is None:
+    if not own:
         return
-    if "radii" in section:  # they cannot say what was calibrated
-        del section["radii"]
-        section["matrix"] = [[float(value) for value in row] for row in robot.transmission]
-    for name, (i, j) in own.items():
-        section["matrix"][i][j] = document["parameters"][name]["value"]
+    T = np.eye(robot.n) if robot.transmission is None else robot.transmission.copy()
+    for name, at in own.items():
+        T[at] = document["parameters"][name]["value"]
+    section = document.setdefault("transmission", CommentedMap())
+    if "matrix" not in section:  # radii cannot say what was calibrated
+        section.pop("radii", None)
+        rows = [CommentedSeq([float(value) for value in row]) for row in T]
+        for row in rows:
+            row.fa.set_flow_style()
+        section["matrix"] = rows
+        return
+    for i, row in enumerate(T.tolist()):
+        for j, value in enumerate(row):
+            if section["matrix"][i][j] != value:
+                section["matrix"][i][j] = value

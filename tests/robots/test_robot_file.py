@@ -13,7 +13,7 @@ STIFFNESS = "joint1.stiffness: {value: 400.0, unit: N m/rad, prior_sigma: 600.0,
 BIAS = "bias: {value: [0.04564, 0.00024, -0.02222], prior_sigma: 0.1}"
 TOP_KEYS = (
     "expected calibration, command, constants, derived, description, effects, format, gravity, held_at_mean, joints, "
-    "locked, model, name, noise, parameters, sensors, urdf"
+    "locked, locked_springs, model, name, noise, parameters, sensors, urdf"
 )
 
 # (what stands in doggy.yaml, what stands there instead, what the user is told)

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from jointscope.graphs.starts.end_stops import EndStop, end_stops
 from jointscope.robots.errors import RecordingError
+from jointscope.robots.files.locked_section import names_recording, no_motion_text
 from jointscope.robots.model.robot import Robot
 from jointscope.robots.parts.sensors import LinkEncoder, MotorEncoder
 from jointscope.robots.recordings.recording import Notice, Recording, Stream
@@ -57,7 +58,11 @@ LISTED = 3  # contacts that are named by their times
 
 
 def read_recording(
-    path: str | Path, robot: Robot, progress: Progress | None = None, decode_all: bool = False
+    path: str | Path,
+    robot: Robot,
+    progress: Progress | None = None,
+    decode_all: bool = False,
+    locked_springs: bool = False,
 ) -> Recording:
     """Reads a bag.
 
@@ -66,6 +71,7 @@ def read_recording(
         robot: says which topics, fields, units and joint names.
         progress: called with the number of messages read and expected.
         decode_all: decode every message in full, as a reference for the fast path; the result is the same.
+        locked_springs: whether the recording is wanted for springs being locked in it.
 
     Returns:
         The streams, with notices of what was dropped or looked odd.
@@ -73,6 +79,8 @@ def read_recording(
     Raises:
         RecordingError: the bag cannot be read, or does not hold what the robot needs.
     """
+    if not locked_springs and names_recording(robot, path):
+        raise RecordingError(no_motion_text(robot, path))
     needed = needed_streams(robot)
     with open_bag(path) as bag:
         types = {need.name: check_topic(bag, need.source) for need in needed}

@@ -28,6 +28,7 @@ from jointscope.graphs.transmission.discover_links import discover_links
 from jointscope.robots.errors import RecordingError, SolveError
 from jointscope.tools.acceptance.evaluation import check_models
 from jointscope.tools.bags.needed_streams import check_same_streams
+from jointscope.tools.bags.read_locked import read_coupling
 from jointscope.tools.notebook.given import (
     AnyLimits,
     AnyRecording,
@@ -55,6 +56,7 @@ def calibrate(
     rests: Sequence[str | Path] = (),
     poses: Sequence[str | Path] = (),
     frequency: Sequence[str | Path] = (),
+    locked_springs: Sequence[str | Path] = (),
     sets: Sequence[SetProblem] = (),
     accept: AnyLimits = (),
     leave_out: AnyStretches = (),
@@ -70,6 +72,8 @@ def calibrate(
         rests: bags in which the robot stands, with weights on it or without, for the same estimate.
         poses: tables or bags of the arm at rest with a measured target, for the same estimate.
         frequency: bags in which the arm is shaken, one for each pose, for the same estimate.
+        locked_springs: bags in which springs are locked mechanically, for the same estimate: they show the matrix
+            between motors and links, whose elements become parameters.
         sets: recordings of other kinds that you have made yourself, for the same estimate.
         accept: limits that the result must meet (docs/accept.md); `result.accepted` says whether it does.
         leave_out: stretches in which something acted that does not belong to the robot: (t0, t1) [s] of the only
@@ -89,9 +93,13 @@ def calibrate(
             "no recording of motion is given; from poses alone call calibrate_poses(robot, [read_poses(path, robot)]), "
             "as docs/poses.md shows, from rests or frequency responses alone `jointscope calibrate` on the command line"
         )
-    read_ones = without_stretches(recordings_of(recordings, model), leave_out)
-    if rests or poses or frequency:
+    if rests or poses or frequency or locked_springs:
         model.need_link_dynamics()
+    if locked_springs:
+        coupling = read_coupling(locked_springs, model)
+        model = coupling.of_robot()
+        sets = [*sets, *coupling.sets(model)]
+    read_ones = without_stretches(recordings_of(recordings, model), leave_out)
     if model.free_links:
         found = calibrate_links(model, read_ones, progress=progress)
     else:

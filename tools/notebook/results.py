@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field, fields
 from functools import cached_property
 from typing import Any, Self
@@ -111,9 +112,9 @@ class Calibrated(_Limited, CalibrationResult):
         axes.set(xlabel="time [s]", ylabel="residual [sigma]")
         axes.legend(fontsize="x-small", ncols=3)
 
-    def write(self, files: ResultFiles) -> None:
-        """Robot file, report, viewer recording, JSON."""
-        result_files.write_calibration(self, files, self.acceptance)
+    def write(self, files: ResultFiles, more: Mapping[str, Any] | None = None) -> None:
+        """Robot file, report, viewer recording, JSON; `more` is for the JSON, too."""
+        result_files.write_calibration(self, files, self.acceptance, more)
 
 
 @dataclass(frozen=True, repr=False)

@@ -42,6 +42,19 @@ def add_kind_options(parser: argparse.ArgumentParser, held_out: bool = False) ->
             parser.add_argument(option, nargs="+", type=Path, default=[], metavar=metavar, help=text)
 
 
+def add_locked_option(parser: argparse.ArgumentParser) -> None:
+    """Adds the option for recordings with locked springs."""
+    parser.add_argument(
+        "--locked-springs",
+        nargs="+",
+        type=Path,
+        default=[],
+        metavar="BAG",
+        help="recordings in which springs are locked mechanically: they show the transmission matrix "
+        "(docs/locked_springs.md)",
+    )
+
+
 def add_bag_arguments(parser: argparse.ArgumentParser) -> None:
     """Adds the arguments."""
     parser.add_argument("robot", metavar="ROBOT", help="name of a ready robot, or a robot file")

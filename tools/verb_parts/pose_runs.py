@@ -24,6 +24,7 @@ def check_one_kind(
     rests: Sequence[Path] | None,
     options: Mapping[str, bool],
     frequency: Sequence[Path] | None = None,
+    locked_springs: Sequence[Path] | None = None,
 ) -> None:
     """Kinds of recordings that go together, and no option of another.
 
@@ -33,17 +34,20 @@ def check_one_kind(
         rests: as given; None of a verb that takes none.
         options: of recordings of motion, and whether they are given.
         frequency: as given; None of a verb that takes none.
+        locked_springs: as given; None of a verb that takes none.
 
     Raises:
         RecordingError: none, kinds that do not go together, or such an option without motion.
     """
-    if not bags and not poses and not rests and not frequency:
+    if not bags and not poses and not rests and not frequency and not locked_springs:
         other = "" if rests is None else ", or --rests BAG"
         other += "" if frequency is None else ", or --frequency BAG"
+        other += "" if locked_springs is None else ", or --locked-springs BAG"
         raise RecordingError(
             f"nothing to calibrate from; expected BAG... before the first option, or --poses FILE{other}"
         )
     still = {"rests": rests or (), "poses": poses, "frequency responses": frequency or ()}
+    still["locked springs"] = locked_springs or ()
     twice = next(((path, kind) for kind, paths in still.items() for path in bags if path in paths), None)
     if twice is not None:
         raise RecordingError(f"{twice[0]} is given as motion and as {twice[1]}; leave it out once")
@@ -51,7 +55,7 @@ def check_one_kind(
         _given_once(option, paths)
     given = next((option for option, there in options.items() if there), None)
     if given and not bags:
-        other = "--poses" if poses else "--frequency" if frequency else "--rests"
+        other = "--poses" if poses else "--frequency" if frequency else "--rests" if rests else "--locked-springs"
         raise RecordingError(f"{given} is for recordings of motion; leave it out with {other}")
 
 

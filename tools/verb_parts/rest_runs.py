@@ -1,12 +1,13 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""`calibrate` and `compare` with --rests, alone or with other kinds: rests in, robot file, report and JSON out."""
+"""`calibrate` and `compare` with --rests or --locked-springs, alone or with other kinds: robot file, report, JSON."""
 
 from __future__ import annotations
 
 import argparse
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from jointscope.robots.errors import RecordingError
 from jointscope.robots.model.robot import Robot
@@ -18,6 +19,9 @@ from jointscope.tools.verb_parts.frequency_runs import agreement_json, frequency
 from jointscope.tools.verb_parts.pose_runs import pose_json, pose_origin, urdf_files
 from jointscope.tools.verb_parts.result_files import ResultFiles, refuse_viewer, write_found
 from jointscope.tools.writing.origin import made_from, other_kinds
+
+if TYPE_CHECKING:
+    from jointscope.graphs.locked_springs.coupling import Coupling
 
 
 def check_held_out_rests(args: argparse.Namespace) -> None:
@@ -45,9 +49,17 @@ def read_all_rests(paths: Sequence[Path], robot: Robot, progress: Progress) -> l
 
 
 def run_rest_calibration(
-    robot: Robot, paths: Sequence[Path], files: ResultFiles, limits: Sequence[Limit], progress: Progress
+    robot: Robot,
+    paths: Sequence[Path],
+    files: ResultFiles,
+    limits: Sequence[Limit],
+    progress: Progress,
+    coupling: Coupling | None = None,
 ) -> tuple[str, AcceptedBy]:
-    """Calibrates from rests alone, writes the files, and returns what the screen says, and which limits are kept.
+    """Calibrates from rests, beside locked springs or alone, and writes the files.
+
+    Returns:
+        What the screen says, and which limits are kept.
 
     Raises:
         RobotError: a viewer recording was asked for.
@@ -58,10 +70,70 @@ def run_rest_calibration(
     from jointscope.tools.terminal.rests_text import rest_calibration_text
 
     refuse_viewer(files, robot, "rests")
-    result = calibrate_rests(robot, read_all_rests(paths, robot, progress), progress)
+    beside = coupling.sets(robot) if coupling else []
+    result = calibrate_rests(robot, read_all_rests(paths, robot, progress), progress, beside=beside)
     made = made_from(robot.path.name) | other_kinds(result)
-    checked = write_found(files, robot.name, result, rests_report, made, result.to_json(), limits)
-    return rest_calibration_text(result), checked
+    if coupling is not None:
+        made |= _locked_origin(coupling)
+    content = result.to_json() | coupling_json(coupling)
+    checked = write_found(files, robot.name, result, rests_report, made, content, limits)
+    return "\n\n".join([*coupling_lines(coupling), rest_calibration_text(result)]), checked
+
+
+def coupling_of(paths: Sequence[Path], robot: Robot) -> Coupling | None:
+    """The transmission that recordings with locked springs show; None without any."""
+    if not paths:
+        return None
+    from jointscope.tools.bags.read_locked import read_coupling
+
+    robot.need_link_dynamics()
+    return read_coupling(paths, robot)
+
+
+def coupling_lines(coupling: Coupling | None) -> list[str]:
+    """What the screen says of a transmission; nothing without one."""
+    from jointscope.tools.terminal.coupling_text import coupling_text
+
+    return [] if coupling is None else [coupling_text(coupling)]
+
+
+def coupling_json(coupling: Coupling | None) -> dict[str, Any]:
+    """The same for machines."""
+    return {} if coupling is None else {"coupling": coupling.to_json()}
+
+
+def _locked_origin(coupling: Coupling) -> dict[str, Any]:
+    each = [readings for fit in coupling.fits for readings in fit.readings]
+    return {"locked_springs": [{"path": r.path, "sha256": r.sha256, "count": len(r)} for r in each]}
+
+
+def run_locked_calibration(
+    robot: Robot, coupling: Coupling, files: ResultFiles, limits: Sequence[Limit], progress: Progress
+) -> tuple[str, AcceptedBy]:
+    """Writes the transmission that locked springs alone show, and returns the screen's text and which limits are kept.
+
+    Args:
+        robot: with that transmission.
+        coupling: what was found.
+        files: where to.
+        limits: that the user has declared.
+        progress: called with a text and the share done.
+
+    Raises:
+        RobotError: a viewer recording was asked for.
+        JointscopeError: a file cannot be written; then none is.
+    """
+    from jointscope.tools.report.locked_report import locked_report
+
+    refuse_viewer(files, robot, "locked springs")
+    progress("writing", 1.0)
+    values = coupling.to_parameters()
+    made = made_from(robot.path.name) | _locked_origin(coupling)
+    found = replace(robot, parameters={**robot.parameters, **values})
+    table = {p.name: {"value": p.value, "sigma": p.sigma, "unit": p.unit} for p in values.values()}
+    content = {"converged": True, "parameters": table} | coupling_json(coupling)
+    checked = write_found(files, robot.name, replace(coupling, robot=found), locked_report, made, content, limits)
+    return coupling_lines(coupling)[0], checked
 
 
 def run_calibration_with_rests(

@@ -100,13 +100,15 @@ def check_viewer(robot: Robot, files: ResultFiles) -> None:
         raise RobotError(f"{robot.name}: --rrd is not available with link_dynamics: free; use --report")
 
 
-def write_calibration(result: Any, files: ResultFiles, checked: AcceptedBy = NO_LIMITS) -> None:
+def write_calibration(
+    result: Any, files: ResultFiles, checked: AcceptedBy = NO_LIMITS, more: Mapping[str, Any] | None = None
+) -> None:
     """Writes a CalibrationResult, and which limits it keeps; errors as of `_write`, as of all that follow."""
     from jointscope.tools.report import calibration_report
     from jointscope.tools.rerun_log import log_calibration
     from jointscope.tools.verdicts.judgement import judge
 
-    report, said = partial(calibration_report, checked=checked), acceptance_json(checked)
+    report, said = partial(calibration_report, checked=checked), acceptance_json(checked) | dict(more or {})
     _write(result, files, report, log_calibration, lambda: judge(result).to_json() | said, provenance(result))
 
 

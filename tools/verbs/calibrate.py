@@ -15,19 +15,27 @@ from jointscope.tools.acceptance.limits import Limit
 from jointscope.tools.presentation.left_out import add_leave_out_option, leave_out, recording_arguments
 from jointscope.tools.terminal.progress import Progress, progress_bar, reading
 from jointscope.tools.verb_parts.acceptance import add_accept_option, limits_of, print_acceptance
-from jointscope.tools.verb_parts.bag_arguments import add_kind_options
+from jointscope.tools.verb_parts.bag_arguments import add_kind_options, add_locked_option
 from jointscope.tools.verb_parts.frequency_runs import (
     run_frequency_calibration,
     run_kinds_calibration,
 )
 from jointscope.tools.verb_parts.pose_runs import check_one_kind, run_pose_calibration, urdf_files
-from jointscope.tools.verb_parts.rest_runs import run_calibration_with_rests, run_rest_calibration
+from jointscope.tools.verb_parts.rest_runs import (
+    coupling_json,
+    coupling_lines,
+    coupling_of,
+    run_calibration_with_rests,
+    run_locked_calibration,
+    run_rest_calibration,
+)
 from jointscope.tools.verb_parts.result_files import ResultFiles, add_result_options, check_viewer
 from jointscope.tools.verb_parts.user_effects import add_effects_option, effects_words, load_user_effects
 from jointscope.tools.verb_parts.workers import add_spreading_option, check_one_choice, check_workers, workers_of
 from jointscope.tools.writing.whole_file import check_outputs, whole_file
 
 if TYPE_CHECKING:
+    from jointscope.graphs.locked_springs.coupling import Coupling
     from jointscope.robots.model.robot import Robot
 
 DESCRIPTION = "Finds the parameters of a robot from recordings, with their uncertainties."
@@ -38,6 +46,7 @@ EXAMPLE = """example:
   jointscope calibrate tx90l --frequency frequency_P1 frequency_P3 --poses poses -o arm.yaml --report arm.html
   jointscope calibrate biorob train --rests spring1 spring2 gravity -o arm.yaml --report arm.html
   jointscope calibrate arm.yaml --rests weights --poses poses -o arm_calibrated.yaml --report arm.html
+  jointscope calibrate arm.yaml train --locked-springs bench -o arm_calibrated.yaml
   jointscope calibrate arm.yaml train --frequency frequency_P1 frequency_P3 --poses poses -o arm_calibrated.yaml
 
 Several bags share all parameters; each has its own states and gyro biases. The result is a robot file that every verb
@@ -63,6 +72,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     add_spreading_option(parser)
     add_kind_options(parser)
+    add_locked_option(parser)
     parser.add_argument("--urdf", type=Path, metavar="F.urdf", help="write the URDF with the geometry found from poses")
     add_accept_option(parser)
     add_leave_out_option(parser)
@@ -72,19 +82,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Calibrates, writes the files, and says what was found."""
-    if args.incremental and args.solver == "samples":
-        raise SolveError("--incremental goes over condensed factors; leave out `--solver samples`")
-    if (args.incremental or args.solver == "samples") and (args.workers > 1 or args.scheduler is not None):
-        raise SolveError(
-            f"{'--incremental' if args.incremental else '--solver samples'} solves in this process alone; leave out "
-            "--workers and --scheduler"
-        )
+    _check_solvers(args)
     files = ResultFiles.of(args)
     check_one_choice(args)
     _check_kinds(args)
     check_outputs(
         [*files.all, *filter(None, [args.urdf])],
-        inputs=[*args.bags, *args.poses, *args.rests, *args.frequency, *args.effects],
+        inputs=[*args.bags, *args.poses, *args.rests, *args.frequency, *args.locked_springs, *args.effects],
     )
     from jointscope.robots.files.robot_file import load_robot
     from jointscope.robots.model.command_words import bag_arguments
@@ -97,7 +101,9 @@ def run(args: argparse.Namespace) -> int:
     load_user_effects(args.effects)
     robot = load_robot(args.robot)
     limits = limits_of(args, [robot])
-    still = _still_kinds(args, robot, files, limits)
+    coupling = coupling_of(args.locked_springs, robot)
+    robot = robot if coupling is None else coupling.of_robot()
+    still = _still_kinds(args, robot, files, limits, coupling)
     if still is not None:
         with progress_bar() as progress:
             text, checked = still(progress)
@@ -118,15 +124,16 @@ def run(args: argparse.Namespace) -> int:
         seen = None if args.incremental else progress  # what is printed and a bar would write into each other
         solver = _solver(args, robot) or workers.solver
         kinds = {"rests": args.rests, "poses": args.poses, "frequency": args.frequency}
-        result = calibrate(robot, recordings, **kinds, accept=limits, solver=solver, progress=seen)
+        sets = coupling.sets(robot) if coupling else []
+        result = calibrate(robot, recordings, **kinds, sets=sets, accept=limits, solver=solver, progress=seen)
         if files.pictures:
             progress("writing", 1.0)
-        result.write(files)
+        result.write(files, coupling_json(coupling))
         for path, content in urdf_files(result.robot, args.urdf).items():
             with whole_file(path) as written:
                 written.write_text(content, encoding="utf-8")
     judgement = judge(result)
-    print(calibration_text(result, judgement))
+    print("\n\n".join([*coupling_lines(coupling), calibration_text(result, judgement)]))
     files.tell(args.urdf)
     if judgement.level != "good":
         words = [bag_arguments([args.output]), recording_arguments(recordings), *effects_words(args.effects)]
@@ -135,11 +142,13 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _still_kinds(
-    args: argparse.Namespace, robot: Robot, files: ResultFiles, limits: Sequence[Limit]
+    args: argparse.Namespace, robot: Robot, files: ResultFiles, limits: Sequence[Limit], coupling: Coupling | None
 ) -> Callable[[Progress], tuple[str, AcceptedBy]] | None:
-    """What calibrates from poses, frequency responses or rests alone; None where there is motion."""
+    """What calibrates from poses, frequency responses, rests or locked springs; None where there is motion."""
     if args.bags:
         return None
+    if coupling is not None and not (args.rests or args.poses or args.frequency):
+        return partial(run_locked_calibration, robot, coupling, files, limits)
     if args.rests and (args.poses or args.frequency):
         kinds = (args.rests, args.poses, args.frequency)
         return partial(run_calibration_with_rests, robot, *kinds, files, args.urdf, limits)
@@ -149,8 +158,24 @@ def _still_kinds(
         return partial(run_pose_calibration, robot, args.poses, files, args.urdf, limits)
     if not (args.rests or args.frequency):
         return None
-    run_still = run_rest_calibration if args.rests else run_frequency_calibration
-    return partial(run_still, robot, args.rests or args.frequency, files, limits)
+    if args.rests:
+        return partial(run_rest_calibration, robot, args.rests, files, limits, coupling=coupling)
+    return partial(run_frequency_calibration, robot, args.frequency, files, limits)
+
+
+def _check_solvers(args: argparse.Namespace) -> None:
+    """Solvers that go together.
+
+    Raises:
+        SolveError: two of them.
+    """
+    if args.incremental and args.solver == "samples":
+        raise SolveError("--incremental goes over condensed factors; leave out `--solver samples`")
+    if (args.incremental or args.solver == "samples") and (args.workers > 1 or args.scheduler is not None):
+        raise SolveError(
+            f"{'--incremental' if args.incremental else '--solver samples'} solves in this process alone; leave out "
+            "--workers and --scheduler"
+        )
 
 
 def _check_kinds(args: argparse.Namespace) -> None:
@@ -166,9 +191,16 @@ def _check_kinds(args: argparse.Namespace) -> None:
         "--scheduler": args.scheduler is not None,
         "--workers": args.workers > 1,
     }
-    check_one_kind(args.bags, args.poses, args.rests, of_motion, args.frequency)
+    if args.locked_springs and not args.bags and (args.poses or args.frequency):
+        option = "--poses" if args.poses else "--frequency"
+        raise RecordingError(
+            f"--locked-springs goes alone, with recordings of motion, or with --rests alone; without motion leave "
+            f"{option} out: calibrate the transmission first, then take the file that was written"
+        )
+    check_one_kind(args.bags, args.poses, args.rests, of_motion, args.frequency, args.locked_springs)
     sample_by_sample = next((option for option in ("--incremental", "--solver samples") if of_motion[option]), None)
     others = {"--poses": args.poses, "--rests": args.rests, "--frequency": args.frequency}
+    others["--locked-springs"] = args.locked_springs
     beside = next((option for option, paths in others.items() if paths), None)
     if sample_by_sample and beside:
         raise RecordingError(

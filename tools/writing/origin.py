@@ -11,7 +11,7 @@ from typing import Any
 import jointscope
 from jointscope.robots.recordings.recording import Recording
 
-KINDS = ("bags", "rests", "poses", "frequency")
+KINDS = ("bags", "rests", "poses", "frequency", "locked_springs")
 """Keys under which recordings stand."""
 
 
@@ -26,11 +26,15 @@ def provenance(result: Any) -> dict[str, Any]:
 
 
 def other_kinds(result: Any) -> dict[str, Any]:
-    """Rests, poses and frequency responses that a calibration used beside motion."""
+    """Rests, poses, frequency responses and locked springs that a calibration used beside motion."""
     still = [(p.kind, getattr(p, p.kind)) for p, *_ in result.sets if p.kind in ("rests", "poses")]
     found: dict[str, Any] = {}
     for kind, each in still:
         found.setdefault(kind, []).append({"path": each.path, "sha256": each.sha256, "count": len(each)})
+    for p, *_ in result.sets:
+        if p.kind == "locked_springs":
+            each = {"path": p.readings.path, "sha256": p.readings.sha256, "count": len(p.readings)}
+            found.setdefault(p.kind, []).append(each)
     shaken = [one.pose for p, *_ in result.sets if p.kind == "frequency" for one in p.problems]
     return found | ({"frequency": [{"path": p.path, "sha256": p.sha256} for p in shaken]} if shaken else {})
 

@@ -1,0 +1,43 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Recordings with locked springs from bags, and the transmission that they show."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+
+from jointscope.graphs.locked_springs.coupling import Coupling, find_coupling
+from jointscope.graphs.locked_springs.locked_readings import LockedReadings
+from jointscope.robots.files.locked_section import locked_in
+from jointscope.robots.model.robot import Robot
+from jointscope.robots.recordings.recording import must_count_once
+from jointscope.tools.bags.read_recording import read_recording
+
+
+def read_locked(path: str | Path, robot: Robot) -> LockedReadings:
+    """What motors and links read in a bag while springs are locked.
+
+    Args:
+        path: a ROS 1 .bag, a ROS 2 folder, a .db3 or an .mcap.
+        robot: says which topics, and in `locked_springs` which springs; all without it.
+
+    Raises:
+        RobotError: no spring is there that could be locked, or the file names other recordings.
+        RecordingError: the bag cannot be read, has no encoders on the links, or hardly any motion.
+    """
+    robot.need_motion()
+    joints = locked_in(robot, path)
+    encoders = {s.name: s for s in (robot.motor_encoder, robot.link_encoder) if s is not None}
+    return LockedReadings.of(read_recording(path, replace(robot, sensors=encoders), locked_springs=True), robot, joints)
+
+
+def read_coupling(paths: Sequence[str | Path], robot: Robot) -> Coupling:
+    """The transmission of a robot from its recordings with locked springs.
+
+    Raises:
+        JointscopeError: as of `read_locked`, or a spring deflects.
+    """
+    found = [read_locked(path, robot) for path in paths]
+    must_count_once(((readings.path, readings.sha256) for readings in found), "--locked-springs")
+    return find_coupling(robot, found)
