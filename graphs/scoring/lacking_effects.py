@@ -119,7 +119,9 @@ def _hypotheses(robot: Robot) -> list[EffectHypothesis]:
     asked = hypotheses_of(robot)
     asked = [h for h in asked if not (isinstance(h.here.effect, Structure) and h.here.effect.form in SLOW_FORMS)]
     shapes = Counter(h.label for h in asked)
-    return [h for h in asked if shapes[h.label] <= MOST_SHAPES]
+    # curves with knots cost many columns, and their look-alikes of fewer terms stand for them
+    knots = {h.label for h in asked if any(p.of_range for p in h.here.effect.parameters)}
+    return [h for h in asked if shapes[h.label] <= MOST_SHAPES and h.label not in knots]
 
 
 def _is_possible(step: HypothesisStep) -> bool:
