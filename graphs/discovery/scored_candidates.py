@@ -16,7 +16,7 @@ from jointscope.graphs.calibration.base_model import BaseModel
 from jointscope.graphs.noise.noise_estimation import scaled
 from jointscope.graphs.problem.bag_problem import BagProblem
 from jointscope.graphs.scoring.columns.gap import gap_hypotheses
-from jointscope.graphs.scoring.columns.hypotheses import EffectHypothesis, hypotheses_of
+from jointscope.graphs.scoring.columns.hypotheses import EffectHypothesis, deflections_of, hypotheses_of
 from jointscope.graphs.scoring.columns.score_signals import ScoreSignals
 from jointscope.graphs.scoring.hypothesis_score import HypothesisScore, JointScores, best_shapes
 from jointscope.graphs.scoring.order_scan import scan_orders
@@ -87,14 +87,15 @@ def score_candidates(base: BaseModel) -> ScoredCandidates:
     segments = [s for bag in range(len(base.recordings)) for s in segments_of(base, bag)]
     test, scan = ScoreTest(segments), scan_orders(segments)
     hidden, tried = gap_hypotheses([segment.signals for segment in segments]), Counter[str]()
-    scores = test.each([*hypotheses_of(base.robot, scan.orders), *hidden])
+    deflections = deflections_of(base.robot, [segment.signals.seen for segment in segments])
+    scores = test.each([*hypotheses_of(base.robot, scan.orders, deflections=deflections), *hidden])
     for label in (score.hypothesis.label for score in scores):
         tried[label] += scan.searched.get(label, 1)
 
     def worth(score: HypothesisScore) -> float:
         return score.worth(test.seconds)
 
-    ordered = sorted(best_shapes(scores).values(), key=worth, reverse=True)
+    ordered = _best_of_families(sorted(best_shapes(scores).values(), key=worth, reverse=True))
     hypotheses = [score.hypothesis for score in ordered[:MOST_TOGETHER]]
     if not hypotheses:
         return ScoredCandidates([], {}, 0.0)
@@ -118,6 +119,18 @@ def score_candidates(base: BaseModel) -> ScoredCandidates:
         levels[level] = tuple(score.hypothesis.label for score in sorted(scores, key=worth, reverse=True)[:BEST])
     placebo = test.placebo([_placebos(segment.signals) for segment in segments])
     return ScoredCandidates(found, levels, float(np.max(placebo)))
+
+
+def _best_of_families(ordered: Sequence[HypothesisScore]) -> list[HypothesisScore]:
+    """Of laws that differ in their detail alone the one that is worth most, which stands first.
+
+    A score less dof log samples is the logarithm of the marginal likelihood to first order: the number of knots of a
+    curve is chosen by it.
+    """
+    found: dict[str, HypothesisScore] = {}
+    for score in ordered:
+        found.setdefault(score.hypothesis.here.family, score)
+    return list(found.values())
 
 
 def segments_of(base: BaseModel, bag: int) -> list[Segment]:

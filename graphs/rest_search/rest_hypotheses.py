@@ -8,7 +8,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from jointscope.graphs.scoring.columns.hypotheses import EffectHypothesis, hypotheses_of
+from jointscope.graphs.rest_search.rest_fits import RestFit
+from jointscope.graphs.scoring.columns.hypotheses import EffectHypothesis, deflections_of, hypotheses_of
 from jointscope.robots.dynamics.at_rest import AT_ONCE, SLIPPING
 from jointscope.robots.effect_kinds.effect import LINK_SIDE
 from jointscope.robots.effect_kinds.joint_torque import JointSignals, JointTorque
@@ -22,10 +23,14 @@ FAST = 1e3  # [s/m, s/rad] no damping is so large beside its own size
 NOTHING = "does nothing while nothing moves"
 
 
-def tried_and_silent(robot: Robot) -> tuple[list[EffectHypothesis], dict[str, str]]:
-    """What is tried, with each of its shapes, and the reason why another effect is not, by label."""
-    tried, silent = [], dict[str, str]()
-    for hypothesis in hypotheses_of(robot, at_rest=True):
+def tried_and_silent(fit: RestFit) -> tuple[list[EffectHypothesis], dict[str, str]]:
+    """What a fitted model may lack, with each shape, and the reason why another effect is not tried, by label."""
+    tried, silent, robot = [], dict[str, str](), fit.robot
+    # where encoders say: a model that lacks a curve bends its own states
+    positions = np.zeros((len(fit.x), robot.layout.size))
+    positions[:, robot.layout.positions] = fit.rests.start(fit.calibration)[0]
+    seen = deflections_of(robot, [fit.rests.model.seen(positions, robot.values)])
+    for hypothesis in hypotheses_of(robot, at_rest=True, deflections=seen):
         why = _why_silent(robot, hypothesis)
         if why:
             silent[hypothesis.label] = why

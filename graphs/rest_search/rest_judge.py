@@ -26,6 +26,7 @@ HARM = 0.2  # of what it gains in all, that it may lose in a group
 MOST_OF_A_REST = 5.0  # log likelihood that one rest may gain or lose: edges of bands are sharp, and a miss is far out
 ENOUGH = 3.0  # log likelihood of all groups together from which a gain is one, e^3 = 20 times likelier
 TIED = 2.0  # [sigma over the groups] gains that differ by less are equal
+DECISIVE = 5.0  # by which a log marginal likelihood must be larger to decide (Kass, Raftery 1995, JASA 90, sec. 3.2)
 VERDICTS = ("missing", "possible", "stand_in", "absent", "untestable")
 
 
@@ -86,13 +87,13 @@ def judge_rests(base: RestFit, folds: Sequence[Mask]) -> Judged:
         base: the model, fitted to all rests.
         folds: groups of rests that are left out in turn.
     """
-    hypotheses, silent = tried_and_silent(base.robot)
+    hypotheses, silent = tried_and_silent(base)
     scores = score_rests(base.rests, base.robot, base.x, hypotheses)
     count = sum(not score.silent for score in scores.scores)
     judge = _Judge(scores, count, race(base, scores, count, folds), folds)
     best = max(judge.good, key=lambda each: judge.gains(each).sum(), default=None)
     equal, after = judge.equal_to(best)
-    leader = min(equal, key=lambda each: each.score.dof, default=None)
+    leader = _simplest(equal)
     if leader is not best:
         _, after = judge.equal_to(leader)
     family = {each.label for each in equal}
@@ -125,7 +126,7 @@ class _Judge:
         """Good effects that are worth as much as the best one, and nothing beside it; scores beside it."""
         if best is None:
             return [], None
-        hypotheses, _ = tried_and_silent(best.fit.robot)
+        hypotheses, _ = tried_and_silent(best.fit)
         after = score_rests(best.fit.rests, best.fit.robot, best.fit.x, hypotheses)
         others = [each for each in self.good if each is not best and self._equal(best, each)]
         return [best, *(each for each in others if not self._remains(each.score, after))], after
@@ -193,6 +194,12 @@ class _Judge:
         assert before is not None and after is not None
         gained = np.clip(before - after, -MOST_OF_A_REST, MOST_OF_A_REST)
         return np.array([gained[fold].sum() for fold in self.folds])
+
+
+def _simplest(equal: Sequence[Tried]) -> Tried | None:
+    """Of effects that are worth as much on what was left out the one with the fewest sizes, if evidence allows it."""
+    most = max((each.evidence for each in equal), default=0.0)
+    return min((each for each in equal if each.evidence > most - DECISIVE), key=lambda t: t.score.dof, default=None)
 
 
 def _possible(tried: Tried) -> bool:

@@ -18,8 +18,9 @@ from jointscope.graphs.rest_search.rest_fits import Mask, RestFit, fit_rests
 from jointscope.graphs.rest_search.rest_scores import RestScore, RestScores
 from jointscope.graphs.rests.independent_states import reduced
 from jointscope.graphs.rests.rest_set import EDGE
+from jointscope.robots.effect_kinds.joint_torque import JointTorque
 from jointscope.robots.errors import SolveError
-from jointscope.robots.files.effect_editing import add_effect
+from jointscope.robots.files.effect_editing import add_effect, remove_effect
 from jointscope.robots.model.robot import Robot
 
 Array = NDArray[np.float64]
@@ -39,18 +40,25 @@ class Tried:
         score: of the linear step before.
         fit: of the model with it to all rests.
         sigmas: of its sizes, by the last part of their names.
+        log_share: logarithm of the share of the priors' volume that the rests leave to all values.
         costs: of each rest when it was left out, shape (m,); None where others were better already.
     """
 
     score: RestScore
     fit: RestFit
     sigmas: dict[str, float]
+    log_share: float
     costs: Array | None = None
 
     @property
     def label(self) -> str:
         """ID@OWNER."""
         return self.score.label
+
+    @property
+    def evidence(self) -> float:
+        """Logarithm of the marginal likelihood, but for what is the same with every effect (Laplace's method)."""
+        return self.log_share - self.fit.cost
 
     @property
     def sizes(self) -> dict[str, float]:
@@ -77,8 +85,9 @@ def race(base: RestFit, scores: RestScores, count: int, folds: Sequence[Mask]) -
         count: number of effects that were looked at.
         folds: groups of rests that are left out in turn.
     """
-    starters = [each for each in (_fitted(base, score) for score in _starters(scores, count)) if each is not None]
+    starters = _all_fitted(base, _starters(scores, count))
     starters.sort(key=lambda each: each.fit.cost + each.score.dof)
+    starters = _best_of_families(starters)
     if not starters:
         return Race({}, np.zeros(0))
     finalists = [replace(each, costs=_left_out(each.fit, folds)) for each in starters[:FINALISTS]]
@@ -95,25 +104,74 @@ def _starters(scores: RestScores, count: int) -> list[RestScore]:
     """The most significant effects, few of those that explain the same."""
     found: list[RestScore] = []
     for score in scores.scores:
-        if len(found) == STARTERS or not significant(score, count):
+        if len({of_family(other) for other in found}) == STARTERS or not significant(score, count):
             break
-        if sum(scores.alike(score, other) > ALIKE for other in found) < OF_A_KIND:
+        # laws that differ in their detail alone are one
+        alike = {of_family(other) for other in found if scores.alike(score, other) > ALIKE} - {of_family(score)}
+        if len(alike) < OF_A_KIND or of_family(score) in {of_family(other) for other in found}:
             found.append(score)
     return found
+
+
+def of_family(score: RestScore) -> str:
+    """FAMILY@OWNER of an effect."""
+    return score.score.hypothesis.here.family
+
+
+def _best_of_families(starters: Sequence[Tried]) -> list[Tried]:
+    """Of laws that differ in their detail alone the one with the largest marginal likelihood, in the same order."""
+    best: dict[str, Tried] = {}
+    for each in starters:
+        name = of_family(each.score)
+        if name not in best or each.evidence > best[name].evidence:
+            best[name] = each
+    return [each for each in starters if best[of_family(each.score)] is each]
+
+
+def _all_fitted(base: RestFit, starters: Sequence[RestScore]) -> list[Tried]:
+    """Effects fitted to all rests; of a family the finer ones begin at the coarser ones, too."""
+    found, coarser = list[Tried](), dict[str, Tried]()
+    for score in sorted(starters, key=lambda score: len(score.score.hypothesis.sizes)):
+        each, coarse = _fitted(base, score), coarser.get(of_family(score))
+        finer = None if coarse is None else _refined(coarse, score)
+        each = finer if each is None or (finer is not None and finer.fit.cost < each.fit.cost) else each
+        if each is not None:
+            found.append(each)
+            coarser[of_family(score)] = each
+    return found
+
+
+def _refined(coarse: Tried, score: RestScore) -> Tried | None:
+    """An effect fitted from where a coarser member of its family ended; None where the fit ran away."""
+    before, here = coarse.score.score.hypothesis.here, score.score.hypothesis.here
+    assert isinstance(here.effect, JointTorque)
+    values = here.effect.refined(before.effect, before.own(coarse.fit.robot.values))
+    robot = add_effect(remove_effect(coarse.fit.robot, coarse.label), score.label, values)
+    try:
+        start = Calibration.of(robot).only(coarse.fit.calibration.blocks)
+        fit = fit_rests(coarse.fit.rests.of_robot(robot), coarse.fit.x, start)
+    except SolveError:
+        return None
+    return Tried(score, fit, *_sigmas_and_share(fit, score))
 
 
 def _fitted(base: RestFit, score: RestScore) -> Tried | None:
     """An effect fitted to all rests; None where the fit ran away, which is where it explains less than nothing."""
     robot = with_score(base.robot, score)
     start = Calibration.of(robot).only(base.calibration.blocks)
+    effect, best = score.score.hypothesis.here.effect, base.cost
+    # the whole curve of a spring is a long way off, and sharp edges stop some fits on it: the best of all counts
+    whole, found = isinstance(effect, JointTorque) and effect.curve == "whole", None
     for edges in STAGES:
         try:
             fit = fit_rests(base.rests.of_robot(robot), base.x, start, edges)
         except SolveError:
             continue
-        if fit.cost < base.cost:
-            return Tried(score, fit, _sigmas(fit, score))
-    return None
+        if fit.cost < best:
+            found, best = fit, fit.cost
+            if not whole:
+                break
+    return None if found is None else Tried(score, found, *_sigmas_and_share(found, score))
 
 
 def with_score(robot: Robot, score: RestScore) -> Robot:
@@ -132,17 +190,20 @@ def with_score(robot: Robot, score: RestScore) -> Robot:
     return replace(robot, parameters=parameters)
 
 
-def _sigmas(fit: RestFit, score: RestScore) -> dict[str, float]:
+def _sigmas_and_share(fit: RestFit, score: RestScore) -> tuple[dict[str, float], float]:
+    """Sigmas of an effect's sizes, and `Tried.log_share`."""
     H, _ = reduced(fit.rests.linearize(fit.x, fit.calibration))
     own = fit.calibration.columns[DYNAMICS]
     parameters = fit.rests.robot.parameters
     weight = [1.0 / parameters[name].coordinate_sigma ** 2 for name in fit.calibration.names]
-    covariance = np.linalg.inv(H[own, own] + np.diag(weight))
+    information = H[own, own] + np.diag(weight)
+    covariance = np.linalg.inv(information)
+    share = 0.5 * float(np.sum(np.log(weight)) - np.linalg.slogdet(information)[1])
     sigmas = dict(
         zip(fit.calibration.names, np.sqrt(np.diag(covariance)) * fit.calibration.value_by_coordinate, strict=True)
     )
     here = score.score.hypothesis.here
-    return {size.name: float(sigmas[here.parameter(size.name)]) for size in score.score.hypothesis.sizes}
+    return {size.name: float(sigmas[here.parameter(size.name)]) for size in score.score.hypothesis.sizes}, share
 
 
 def _left_out(fit: RestFit, folds: Sequence[Mask]) -> Array:

@@ -99,7 +99,9 @@ class Suspects:
         asked = hypotheses_of(robot)
         asked = [h for h in asked if not (isinstance(h.here.effect, Structure) and h.here.effect.form in SLOW_FORMS)]
         shapes = Counter(h.label for h in asked)
-        asked = [h for h in asked if shapes[h.label] <= MOST_SHAPES]
+        # curves with knots cost many columns, and their look-alikes of fewer terms stand for them
+        knots = {h.label for h in asked if any(p.of_range for p in h.here.effect.parameters)}
+        asked = [h for h in asked if shapes[h.label] <= MOST_SHAPES and h.label not in knots]
         return Suspects(asked, len(asked))
 
     def left_by(self, windows: ScoreTest) -> Suspects:

@@ -107,7 +107,10 @@ class WholeSet:
         """
         system = self._problem.linearize(x, calibration)
         for _ in range(MOST_STEPS if len(x) else 0):
-            step = np.linalg.solve(system.D, -system.g_x[:, :, None])[:, :, 0]
+            try:
+                step = np.linalg.solve(system.D, -system.g_x[:, :, None])[:, :, 0]
+            except np.linalg.LinAlgError:
+                break  # a trial so far off that one term drowns the others: its cost turns it down
             if -0.5 * float(np.sum(step * system.g_x)) < ARRIVED * max(system.cost, 1.0):
                 break
             there = self._problem.linearize(x + step, calibration)

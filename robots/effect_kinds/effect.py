@@ -37,6 +37,9 @@ class EffectParameter:
         grid: for a shape, which has no null value (the speed of a Stribeck curve): values that a diagnosis tries;
             empty for a size. One value, the start, where a diagnosis need not try others.
         weak: whether the data may leave it open; its prior then holds it near the start.
+        held: whether it is a choice of the law's form, which no calibration changes.
+        of_range: "forward" or "backward" where `grid` has shares of the largest deflection of the spring that was seen
+            that way, link ahead of or behind the motor; of the start where none was. Empty for values.
     """
 
     name: str
@@ -48,6 +51,8 @@ class EffectParameter:
     logarithmic: bool = False
     grid: tuple[float, ...] = ()
     weak: bool = False
+    held: bool = False
+    of_range: str = ""
 
     @property
     def is_shape(self) -> bool:
@@ -93,6 +98,8 @@ class Effect(ABC):
         turning: whether it can act only on joints that turn, not on prismatic ones.
         example: sizes for tests and demonstrations on the ready robots, by parameter name.
         aliases: other names that users may type.
+        family: what effects have in common that are one law in more or less detail: searches take the member with the
+            best evidence for all of them; empty for an effect of its own.
     """
 
     id: str
@@ -102,6 +109,7 @@ class Effect(ABC):
     turning: bool = False
     example: Mapping[str, float] = field(default_factory=dict)
     aliases: tuple[str, ...] = ()
+    family: str = ""
 
     def may_act_on(self, robot: RobotView, owner: str) -> str:
         """Why the effect cannot act on an owner of this robot; empty if it can."""

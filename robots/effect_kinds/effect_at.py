@@ -26,6 +26,11 @@ class EffectAt:
         """ID@OWNER."""
         return f"{self.effect.id}@{self.owner}"
 
+    @property
+    def family(self) -> str:
+        """FAMILY@OWNER, the label of an effect that has none."""
+        return f"{self.effect.family or self.effect.id}@{self.owner}"
+
     def parameter(self, name: str) -> str:
         """Full name OWNER.EFFECT.NAME of a parameter."""
         return f"{self.owner}.{self.effect.id}.{name}"

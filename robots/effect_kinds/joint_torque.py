@@ -93,6 +93,8 @@ class JointTorque(Effect):
         memory: the effect's own state; None for a law without memory.
         gap: names of the sizes of a dead zone in front of the spring, as `beyond_gap` takes them: other laws of the
             spring feel the deflection beyond it; empty for none.
+        curve: what it makes of a spring's curve: "terms" that add to others, or "whole" where its stiffness is all
+            that may stand beside it; empty for a law that bends no spring.
     """
 
     side: str
@@ -100,6 +102,11 @@ class JointTorque(Effect):
     load: str = "transmitted"
     memory: Memory | None = None
     gap: tuple[str, ...] = ()
+    curve: str = ""
+
+    def refined(self, coarse: Any, p: Mapping[str, float]) -> dict[str, float]:
+        """Values at which the law is that of a coarser member of its family at values p; none where it has none."""
+        return {}
 
     def behind(self, effects: Sequence[EffectAt], owner: str) -> tuple[str, ...]:
         """Full names of the sizes of the dead zone that lies before this law at an owner; empty for none."""

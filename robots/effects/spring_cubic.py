@@ -37,6 +37,7 @@ class SpringCubic(JointTorque):
 EFFECT = SpringCubic(
     id="spring_cubic",
     side="spring",
+    curve="terms",
     law=law,
     parameters=(EffectParameter("stiffness", "N m/rad^3", start=0.0, prior_sigma=1e6),),
     example={"stiffness": 1000.0},
@@ -53,6 +54,11 @@ EFFECT = SpringCubic(
             "backlash": "both make the spring soft at small and hard at large deflections",
             "spring_slack": "where both ropes are slack, both make the spring soft at small deflections",
             "spring_curve": "the same where the curve is alike in both directions",
+            "spring_limit": "hardens towards large deflections as well, with a corner where a string is taut",
+            **dict.fromkeys(
+                ("spring_pieces_1", "spring_pieces_2", "spring_pieces_4"),
+                "the same where the curve is smooth and alike",
+            ),
             "hysteresis": "both change the apparent stiffness with the size of the deflection",
         },
     ),

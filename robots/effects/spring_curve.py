@@ -40,6 +40,7 @@ class SpringCurve(JointTorque):
 EFFECT = SpringCurve(
     id="spring_curve",
     side="spring",
+    curve="terms",
     law=law,
     parameters=(
         EffectParameter("quadratic", "N m/rad^2", start=0.0, prior_sigma=3e4),
@@ -58,6 +59,11 @@ EFFECT = SpringCurve(
         look_alikes={
             "spring_cubic": "the same where the curve is alike in both directions",
             "spring_slack": "an even term makes one direction soft, as slack of one rope does",
+            "spring_limit": "hardens towards large deflections as well, with a corner where a string is taut",
+            **dict.fromkeys(
+                ("spring_pieces_1", "spring_pieces_2", "spring_pieces_4"),
+                "the same over the deflections that were measured, where a third degree is enough",
+            ),
         },
     ),
 )

@@ -43,6 +43,10 @@ EFFECT = JointTorque(
             "spring_curve": "an even term makes one direction soft, as slack of one rope does",
             "spring_cubic": "where both ropes are slack, both make the spring soft at small deflections",
             "torque_offset": "while the spring is loaded one way, slack of its rope takes a constant torque",
+            "spring_limit": "stiff beyond a corner; beside a string the spring has a torque before it, too",
+            **dict.fromkeys(
+                ("spring_pieces_1", "spring_pieces_2", "spring_pieces_4"), "a first piece that is soft looks like slack"
+            ),
         },
     ),
 )

@@ -128,7 +128,8 @@ def parse_effect(text: str, robot: Robot) -> tuple[Effect, str]:
 def _own() -> dict[str, Effect]:
     """The effects of this package; a broken file here is a bug."""
     modules = (importlib.import_module(f"{folder.__name__}.{m.name}") for m in pkgutil.iter_modules(folder.__path__))
-    return {module.EFFECT.id: module.EFFECT for module in modules}
+    families = (getattr(module, "EFFECTS", None) or (module.EFFECT,) for module in modules)
+    return {effect.id: effect for family in families for effect in family}
 
 
 @cache

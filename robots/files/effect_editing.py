@@ -140,12 +140,22 @@ def cannot_be_added(robot: Robot, here: EffectAt) -> str:
     gap = next((other for other in robot.effects if other.owner == owner and _leaves_gap(other)), None)
     if gap is not None and _leaves_gap(here) and gap.effect.id != effect.id:
         return f"{gap.label} is the dead zone of its spring already; remove that first"
+    curve = next((other for other in robot.effects if other.owner == owner and _two_curves(other, here)), None)
+    if curve is not None:
+        return f"{curve.label} is the curve of its spring already; remove that first"
     return ""
 
 
 def _leaves_gap(here: EffectAt) -> bool:
     """Whether an effect is a dead zone in front of a spring."""
     return isinstance(here.effect, JointTorque) and bool(here.effect.gap)
+
+
+def _two_curves(a: EffectAt, b: EffectAt) -> bool:
+    """Whether two different effects bend the same spring and one of them is its whole curve."""
+    if not isinstance(a.effect, JointTorque) or not isinstance(b.effect, JointTorque) or a.effect.id == b.effect.id:
+        return False
+    return bool(a.effect.curve and b.effect.curve) and "whole" in (a.effect.curve, b.effect.curve)
 
 
 def parameter_of(here: EffectAt, p: EffectParameter, value: float) -> Parameter:
@@ -162,6 +172,7 @@ def parameter_of(here: EffectAt, p: EffectParameter, value: float) -> Parameter:
         prior=centre,
         prior_sigma=p.prior_sigma,
         positive=p.logarithmic,
+        fixed=p.held,
         effect=here.effect.id,
         null=None if p.is_shape else p.null,
     )
@@ -193,6 +204,8 @@ def _entry(parameter: Parameter) -> CommentedMap:
     entry["prior_sigma"] = parameter.prior_sigma
     if not parameter.positive:
         entry["positive"] = False
+    if parameter.fixed:
+        entry["fixed"] = True
     if parameter.null is not None:
         entry["null"] = parameter.null
     entry.fa.set_flow_style()

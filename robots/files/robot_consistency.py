@@ -6,6 +6,7 @@ from __future__ import annotations
 from jointscope.robots.errors import RobotError
 from jointscope.robots.files.frequency_section import check_frequency, frequency_units
 from jointscope.robots.files.needed_spring import needed_spring
+from jointscope.robots.files.spring_section import check_curves
 from jointscope.robots.files.transmission_section import check_transmission, element_units
 from jointscope.robots.geometry.arm_effects import effect_units
 from jointscope.robots.geometry.error_parameters import pose_units
@@ -125,6 +126,7 @@ def _check_springs(robot: Robot, place: str) -> None:
                 f"{place}: effects: {here.label} acts in a spring, and {here.owner} is declared rigid; take "
                 f"{here.label} and its parameters out, then `jointscope add` brings it with {spring}"
             )
+    check_curves(robot, place)
 
 
 def _check_stamps(robot: Robot, place: str) -> None:

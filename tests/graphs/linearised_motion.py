@@ -177,10 +177,12 @@ def dof(hypothesis):
 def one_hypothesis_each(name, kinds=None):
     """One hypothesis per effect and owner, in the middle of the grid of its shapes; of Stribeck curves the widest."""
     found = {}
-    for hypothesis in hypotheses_of(ROBOTS[name]):
+    small = dict.fromkeys(ROBOTS[name].joints, {"forward": 4e-3, "backward": 4e-3})  # well within this motion
+    for hypothesis in hypotheses_of(ROBOTS[name], deflections=small):
         if kinds is None or hypothesis.here.effect.id in kinds:
             found.setdefault(hypothesis.label, []).append(hypothesis)
     middle = {
-        label: hypotheses[-1 if "stribeck" in label else len(hypotheses) // 2] for label, hypotheses in found.items()
+        label: hypotheses[-1 if "stribeck" in label else 0 if "limit@" in label else len(hypotheses) // 2]
+        for label, hypotheses in found.items()
     }
     return [(name, hypothesis) for hypothesis in middle.values()]

@@ -3,9 +3,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import product
+
+import numpy as np
+from numpy.typing import NDArray
 
 from jointscope.robots.effect_kinds.effect import EffectParameter
 from jointscope.robots.effect_kinds.effect_at import EffectAt
@@ -14,8 +17,13 @@ from jointscope.robots.files.effect_catalogue import catalogue
 from jointscope.robots.files.effect_editing import cannot_be_added
 from jointscope.robots.model.robot import Robot
 
+Array = NDArray[np.float64]
+
 BEARING_FREQUENCIES = (4.0, 6.0, 9.0, 14.0, 22.0)  # [Hz] resonance of a body on its soft bearing
 BEARING_DAMPING_RATIOS = (0.15,)
+
+Range = Mapping[str, float]  # largest deflections of a spring, "forward" and "backward" [rad]
+LEAST = 0.1  # share of the larger one that each side of a range has at least
 
 # how much of a better integrator's correction the data want: 0 none, 1 all of it
 WHOLE_DEFECT = EffectParameter("share", "1", start=1.0, prior_sigma=10.0, sign="+")
@@ -42,7 +50,10 @@ class EffectHypothesis:
 
 
 def hypotheses_of(
-    robot: Robot, scanned_orders: Mapping[str, Sequence[float]] | None = None, at_rest: bool = False
+    robot: Robot,
+    scanned_orders: Mapping[str, Sequence[float]] | None = None,
+    at_rest: bool = False,
+    deflections: Mapping[str, Range] | None = None,
 ) -> list[EffectHypothesis]:
     """All hypotheses that make sense for a robot.
 
@@ -51,6 +62,7 @@ def hypotheses_of(
         scanned_orders: orders (periods per turn) at which a spectrum of the missing torque has its peaks, by joint;
             they take the place of the grid of effects that repeat with the position.
         at_rest: whether known loads are part of what was recorded.
+        deflections: how far the spring of each joint was seen to be deflected; knots of its laws are placed there.
     """
     found = []
     for effect in catalogue().values():
@@ -65,13 +77,32 @@ def hypotheses_of(
                 continue
             parameters = effect.parameters_at(robot, owner)
             sizes = tuple(p for p in parameters if not p.is_shape)
-            for shapes in _grid(here, parameters, scanned_orders or {}):
+            for shapes in _grid(here, parameters, scanned_orders or {}, (deflections or {}).get(owner, {})):
                 found.append(EffectHypothesis(here, sizes, shapes))
     return found
 
 
+def deflections_of(robot: Robot, seen: Iterable[Array]) -> dict[str, Range]:
+    """How far the spring of each elastic joint was deflected, by joint.
+
+    Args:
+        robot: whose layout the states have.
+        seen: states as springs see them, shape (m, d) each.
+    """
+    layout, found = robot.layout, dict[str, Range]()
+    parts = [x[:, layout.joint_q] - x[:, layout.motor_q] for x in seen]
+    for j in layout.elastic_joints:
+        forward, backward = (max(float(np.max(side * part[:, j])) for part in parts) for side in (1.0, -1.0))
+        least = max(LEAST * max(forward, backward), 1e-9)
+        found[robot.joints[j]] = {"forward": max(forward, least), "backward": max(backward, least)}
+    return found
+
+
 def _grid(
-    here: EffectAt, parameters: Sequence[EffectParameter], scanned_orders: Mapping[str, Sequence[float]]
+    here: EffectAt,
+    parameters: Sequence[EffectParameter],
+    scanned_orders: Mapping[str, Sequence[float]],
+    seen: Range,
 ) -> list[dict[str, float]]:
     """Combinations of shapes."""
     if isinstance(here.effect, Structure) and here.effect.form == "bearing":
@@ -83,6 +114,8 @@ def _grid(
     grids = [
         tuple(scanned_orders[here.owner])
         if here.effect.id == "cogging" and p.name == "order" and here.owner in scanned_orders
+        else tuple(share * seen.get(p.of_range, p.start) for share in p.grid)
+        if p.of_range
         else p.grid
         for p in shapes
     ]

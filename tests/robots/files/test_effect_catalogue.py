@@ -21,7 +21,7 @@ command_delay pwm_deadband spring_cubic backlash hysteresis kinematic_coupling l
 gravity_imbalance coriolis payload inertia_error joint_elasticity bearing_flexibility encoder_eccentricity encoder_scale
 spring_curve weight_dependent_friction encoder_delay gyro_delay gyro_scale gyro_bias_drift clock_offset clock_drift
 truncated_command parallel_spring integration_error torque_constant_error link_mass gravity_direction encoder_offset
-friction_by_direction spring_slack encoder_harmonics
+friction_by_direction spring_slack encoder_harmonics spring_limit spring_pieces_1 spring_pieces_2 spring_pieces_4
 encoder_filter command_limit axis_misalignment""".split()
 UNITS = {
     *("kg", "kg m", "1", "s", "s^2", "s/s", "rad", "rad/s", "rad/s^2", "rad/rad", "V", "kg m2"),

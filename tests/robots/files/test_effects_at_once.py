@@ -144,9 +144,8 @@ def test_an_effect_of_a_spring_brings_the_spring_to_a_rigid_joint(crane, effect)
 def test_every_effect_of_the_catalogue_can_be_added_and_leaves_no_trace(crane):
     before = robot_text(crane, crane.path.parent)
     wanted = []
-    for effect in [
-        name for name in catalogue() if name != "spring_slack"
-    ]:  # a spring has one dead zone, and backlash is one
+    # a spring has one dead zone, and backlash is one; it has one curve
+    for effect in [name for name in catalogue() if name != "spring_slack" and "spring_pieces" not in name]:
         try:
             wanted += add_effects(crane, [f"{effect}@*"]).labels
         except EffectError:

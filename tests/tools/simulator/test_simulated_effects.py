@@ -38,6 +38,7 @@ CATALOGUE = {  # id: (owners, parameters) as simulator and estimator have agreed
     "spring_curve": ("elastic joint", "quadratic cubic"),
     "backlash": ("elastic joint", "half_gap"),
     "spring_slack": ("elastic joint", "forward backward"),
+    "spring_limit": ("elastic joint", "stiffness forward backward"),
     "hysteresis": ("elastic joint", "torque deflection"),
     "kinematic_coupling": ("elastic joint", "from_joint2 from_joint3"),
     "link_viscous": ("joint", "coefficient"),

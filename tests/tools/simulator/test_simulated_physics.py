@@ -67,6 +67,8 @@ SPRING_LAWS = {  # torque that joins the spring's: minus on the link, plus on th
     "spring_cubic": lambda d, rate: 20000.0 * d**3,
     "spring_curve": lambda d, rate: 600.0 * d**2 + 20000.0 * d**3,
     "backlash": lambda d, rate: -K[1] * np.clip(d, -0.012, 0.012) - D[1] * rate * (abs(d) < 0.012),
+    "spring_limit": lambda d, rate: 800.0 * (max(d - 0.02, 0.0) + min(d + 0.03, 0.0)),
+    "spring_ropes": lambda d, rate: 150.0 * max(d - 0.005, 0.0) + 400.0 * min(d + 0.015, 0.0),
     "spring_slack": lambda d, rate: -K[1] * np.clip(d, 0.0, 0.03) - D[1] * rate * (0.0 < d < 0.03),
 }
 

@@ -9,5 +9,9 @@ from __future__ import annotations
 NOT_SIMULATED = {
     "coriolis": "every simulation contains the Coriolis terms; calibrate with 'coriolis: false' in the robot file",
     "joint_elasticity": "a joint is simulated as its robot file has it; calibrate with a file that declares it rigid",
+    **{
+        f"spring_pieces_{pieces}": "a real spring has no knots; simulate spring_ropes, spring_curve or spring_limit"
+        for pieces in (1, 2, 4)
+    },
     "integration_error": "the engine integrates exactly; calibrate with 'integrator: euler' in the robot file",
 }
