@@ -61,15 +61,41 @@ class DynamicsFactor(ABC):
     def residual(self, x: tuple[Array, ...], calibration: Calibration) -> Array:
         """Defects of velocities and positions over each step, shape (m, d)."""
         d_v, d_q = self.defects(x[0], x[1], calibration.values)
-        return self.steps.combine(d_v, d_q)
+        found, plays = self.steps.combine(d_v, d_q), self.model.plays
+        if plays is not None:
+            h = plays.sizes(self.model.named(calibration.values))
+            found[:, plays.rows] = x[1][:, plays.lags] - plays.after(x[0], x[1], h)
+        return found
 
     def linearize(self, x: tuple[Array, ...], calibration: Calibration) -> Linearization:
         """Defects and derivatives."""
-        return self.linearize_pairs(x[0], x[1], calibration)
+        return self._with_plays(self.linearize_pairs(x[0], x[1], calibration), x[0], x[1], calibration)
 
     def linearize_chain(self, x: Array, calibration: Calibration) -> Linearization:
         """As `linearize` for consecutive ticks, x of shape (m + 1, d); may share work between steps."""
+        return self._with_plays(self.linearize_neighbours(x, calibration), x[:-1], x[1:], calibration)
+
+    def linearize_neighbours(self, x: Array, calibration: Calibration) -> Linearization:
+        """As `linearize_pairs` for consecutive ticks."""
         return self.linearize_pairs(x[:-1], x[1:], calibration)
+
+    def _with_plays(self, found: Linearization, x0: Array, x1: Array, calibration: Calibration) -> Linearization:
+        """With the rows of lags of encoders, which no rate moves; in place."""
+        plays = self.model.plays
+        if plays is None:
+            return found
+        values = self.model.named(calibration.values)
+        after, inside, by_size = plays.with_slopes(x0, x1, plays.sizes(values))
+        found.residual[:, plays.rows] = x1[:, plays.lags] - after
+        (J0, J1), by_parameter = found.by_state, found.by_block[DYNAMICS]
+        for i, (row, lag, q) in enumerate(zip(plays.rows, plays.lags, plays.positions, strict=True)):
+            J0[:, row], J1[:, row], by_parameter[:, row] = 0.0, 0.0, 0.0
+            J0[:, row, lag], J0[:, row, q] = -inside[:, i], inside[:, i]
+            J1[:, row, lag], J1[:, row, q] = 1.0, -inside[:, i]
+            if plays.widths[i] in self.model.names:
+                column = self.model.names.index(plays.widths[i])
+                by_parameter[:, row, column] = -by_size[:, i] * calibration.value_by_coordinate[column]
+        return found
 
     @abstractmethod
     def defects(self, x0: Array, x1: Array, parameters: Array) -> tuple[Array, Array]:

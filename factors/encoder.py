@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """What encoders on motors and on links share: theta_measured - q - zero, of one position for each channel.
 
+Where an encoder has play, its lag is taken off: theta_measured - (q - lag) - zero.
+
 Variables: X at the time of the sample.
 """
 
@@ -29,9 +31,11 @@ class EncoderFactor(SensorFactor[AnyEncoder]):
 
     Attributes:
         layout: of the states.
+        lags: channel and column of the lag of each encoder that has play.
     """
 
     layout: StateLayout
+    lags: tuple[tuple[int, int], ...] = ()
 
     @property
     @abstractmethod
@@ -45,11 +49,16 @@ class EncoderFactor(SensorFactor[AnyEncoder]):
 
     def residual(self, x: tuple[Array, ...], calibration: Calibration) -> Array:
         """Predicted - measured, shape (m, n) [rad]."""
-        return x[0][:, self.columns] + self.sensor.zero - self.measured
+        residual = x[0][:, self.columns] + self.sensor.zero - self.measured
+        for channel, column in self.lags:
+            residual[:, channel] -= x[0][:, column]
+        return residual
 
     def linearize(self, x: tuple[Array, ...], calibration: Calibration) -> Linearization:
         """Residual and its constant derivative."""
         m, n = self.measured.shape
         by_state = np.zeros((m, n, self.layout.size))
         by_state[:, np.arange(n), self.columns] = 1.0
+        for channel, column in self.lags:
+            by_state[:, channel, column] = -1.0
         return Linearization(self.residual(x, calibration), (by_state,))

@@ -41,7 +41,7 @@ class SimpsonDynamics(DynamicsFactor):
         a1 = self.model.with_derivatives(x1, last, values, None, self.steps.ends)
         return self._linearize(x0, x1, a0, a1, calibration)
 
-    def linearize_chain(self, x: Array, calibration: Calibration) -> Linearization:
+    def linearize_neighbours(self, x: Array, calibration: Calibration) -> Linearization:
         """As `linearize_pairs`, with the derivatives of the rigid bodies evaluated once per tick.
 
         Between two ticks they are taken as the mean; that changes the Jacobian by parts per million (a test says how

@@ -22,6 +22,7 @@ from jointscope.graphs.problem.standstill import only_stiff_motors
 from jointscope.graphs.problem.timeline import Timeline
 from jointscope.robots.dynamics.command_path import CommandPath
 from jointscope.robots.dynamics.rates_of_many import RatesOfMany
+from jointscope.robots.model.encoder_plays import EncoderPlays
 from jointscope.robots.model.robot import Robot
 
 Array = NDArray[np.float64]
@@ -45,7 +46,8 @@ class Predictor:
         self._h, u = timeline.h, path.acting(robot.values)[0]
         self._torque = self._model.torque_of(u)
         self._cuts = StepCuts(robot, h)
-        self._edges = DeadZoneEdges.of(robot)
+        self._edges, self._plays = DeadZoneEdges.of(robot), EncoderPlays.of(robot)
+        self._play_sizes = np.zeros(0) if self._plays is None else self._plays.sizes(robot.values)
 
     def advance(self, x: Array, step: NDArray[np.intp]) -> Array:
         """States one tick later, shape (s, d).
@@ -57,12 +59,13 @@ class Predictor:
         h, torque = self._h[step][:, None], self._torque[step]
         with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
             after = self._whole(x, h, torque)
-            if self._edges is None or not np.any(met := self._edges.met(x, after)):
-                return after
-            part, acting = x[met], torque[met]
-            for _ in range(PARTS):
-                part = self._whole(part, h[met] / PARTS, acting)
-            after[met] = part
+            if self._edges is not None and np.any(met := self._edges.met(x, after)):
+                part, acting = x[met], torque[met]
+                for _ in range(PARTS):
+                    part = self._whole(part, h[met] / PARTS, acting)
+                after[met] = part
+            if self._plays is not None:
+                after[:, self._plays.lags] = self._plays.after(x, after, self._play_sizes)
             return after
 
     def _whole(self, x: Array, h: Array, torque: Array) -> Array:

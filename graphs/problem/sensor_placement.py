@@ -30,6 +30,7 @@ from jointscope.graphs.problem.timeline import Timeline
 from jointscope.robots.dynamics.spring_torques import SpringTorques
 from jointscope.robots.effect_kinds.effect import LINK_SIDE
 from jointscope.robots.effect_kinds.reading_effect import ReadingEffect
+from jointscope.robots.model.encoder_plays import EncoderPlays
 from jointscope.robots.model.lateness import Lateness, late_channels
 from jointscope.robots.model.robot import Robot
 from jointscope.robots.parts.position_target import PositionTarget
@@ -192,10 +193,10 @@ def factor_on_state(robot: Robot, name: str, values: Array, times: Array) -> Fac
     if isinstance(sensor, TorqueSensor):
         return JointTorqueFactor(sensor, values, SpringTorques(robot))
     if isinstance(sensor, MotorEncoder):
-        inner = MotorEncoderFactor(sensor, values, robot.layout)
+        inner = MotorEncoderFactor(sensor, values, robot.layout, _lags(robot, name))
         seats = {joint: np.array([j]) for j, joint in enumerate(robot.joints)}
     elif isinstance(sensor, LinkEncoder):
-        inner = LinkEncoderFactor(sensor, values, robot.layout)
+        inner = LinkEncoderFactor(sensor, values, robot.layout, _lags(robot, name))
         seats = {f"{joint}{LINK_SIDE}": np.array([j]) for j, joint in enumerate(robot.joints)}
     else:
         inner = GyroFactor(sensor, values, robot.kinematic_tree, robot.layout)
@@ -204,6 +205,15 @@ def factor_on_state(robot: Robot, name: str, values: Array, times: Array) -> Fac
     if not effects:
         return inner
     return DistortedFactor(inner, tuple((here, seats[here.owner]) for here in effects), times, robot.values)
+
+
+def _lags(robot: Robot, sensor: str) -> tuple[tuple[int, int], ...]:
+    """Channel and column of the lag of each encoder of a sensor that has play."""
+    plays = EncoderPlays.of(robot)
+    if plays is None:
+        return ()
+    pairs = zip(plays.seats, plays.lags.tolist(), strict=True)
+    return tuple((channel, column) for (name, channel), column in pairs if name == sensor)
 
 
 def _nearest(times: Array, wanted: Array) -> NDArray[np.intp]:

@@ -29,6 +29,7 @@ from jointscope.robots.effect_kinds.joint_torque import JointSignals, JointTorqu
 from jointscope.robots.effect_kinds.structure import Structure
 from jointscope.robots.effect_kinds.time_shift import TimeShift
 from jointscope.robots.files.effect_editing import add_effect
+from jointscope.robots.model.encoder_plays import unlagged
 from jointscope.robots.model.robot import Robot
 from jointscope.robots.parts.sensors import Sensor
 from jointscope.robots.recordings.recording import Recording
@@ -159,7 +160,8 @@ def _pieces(base: BaseModel, robot: Robot, spans: Sequence[Span]) -> tuple[list[
         piece: Recording = base.recordings[span.bag].between(span.t0, span.t1)
         problem = replace(BagProblem.of(robot, piece, base.between(span.bag)), owner=span.bag)
         problems.append(problem)
-        states.append(base.states_at(span.bag, problem.timeline.ticks, robot.layout))
+        x = base.states_at(span.bag, problem.timeline.ticks, robot.layout)
+        states.append(unlagged(robot, x, known=base.layout.memories))
         calibrations.append(Calibration.of(robot).with_points(base.calibrations[span.bag].own))
     return problems, Estimate(tuple(states), tuple(calibrations))
 

@@ -25,6 +25,7 @@ from jointscope.graphs.problem.bag_problem import BagProblem
 from jointscope.graphs.problem.known_values import knowing, with_known_values
 from jointscope.graphs.refits.loop_validation import judged_by_loop, loop_squares
 from jointscope.robots.errors import JointscopeError
+from jointscope.robots.model.encoder_plays import unlagged
 from jointscope.robots.model.robot import Robot
 from jointscope.robots.recordings.recording import Recording
 
@@ -67,7 +68,7 @@ def validation_error(
         recording = base.recordings[bag]
         problem = BagProblem.of(knowing(robot), recording)
         calibration = Calibration.of(problem.robot).with_points(biases[bag].own)
-        x = base.states_at(bag, problem.timeline.ticks, robot.layout)
+        x = unlagged(robot, base.states_at(bag, problem.timeline.ticks, robot.layout), known=base.layout.memories)
         causal = filter_states(problem, calibration, x)
         predictor = Predictor(problem.robot, problem.timeline)
         for horizon, target in squares.items():

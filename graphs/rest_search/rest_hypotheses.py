@@ -13,6 +13,7 @@ from jointscope.graphs.scoring.columns.hypotheses import EffectHypothesis, defle
 from jointscope.robots.dynamics.at_rest import AT_ONCE, SLIPPING
 from jointscope.robots.effect_kinds.effect import LINK_SIDE
 from jointscope.robots.effect_kinds.joint_torque import JointSignals, JointTorque
+from jointscope.robots.effect_kinds.lagging_reading import LaggingReading
 from jointscope.robots.effect_kinds.reading_effect import ReadingEffect
 from jointscope.robots.effect_kinds.smoothed_reading import SmoothedReading
 from jointscope.robots.effect_kinds.structure import Structure
@@ -61,7 +62,7 @@ def _why_silent(robot: Robot, hypothesis: EffectHypothesis) -> str:
         return "needs coordinates of its own, which are tried with recordings of motion only" if hinges else NOTHING
     if isinstance(effect, ReadingEffect) and owner.removesuffix(LINK_SIDE) not in robot.joints:
         return "its sensor is not read at rest"
-    if isinstance(effect, JointTorque) and effect.memory is not None:
+    if isinstance(effect, LaggingReading) or (isinstance(effect, JointTorque) and effect.memory is not None):
         return "depends on how a joint came to rest, which rests do not show"
     if isinstance(effect, JointTorque) and effect.side == "link" and _is_dry(effect, hypothesis):
         return "would hold a link away from equilibrium, at which rests take all links"

@@ -19,6 +19,7 @@ from jointscope.graphs.scoring.columns.elasticity import elasticity_column
 from jointscope.graphs.scoring.columns.hypotheses import EffectHypothesis
 from jointscope.graphs.scoring.columns.inertia import axis_columns, coriolis_columns, gravity_columns, inertia_columns
 from jointscope.graphs.scoring.columns.joint_torque import joint_torque_columns
+from jointscope.graphs.scoring.columns.play import play_column
 from jointscope.graphs.scoring.columns.reading import late_column, reading_column, smooth_column
 from jointscope.graphs.scoring.columns.robot_torque import robot_torque_columns
 from jointscope.graphs.scoring.columns.score_signals import ScoreSignals
@@ -27,6 +28,7 @@ from jointscope.graphs.scoring.score_system import Segment
 from jointscope.robots.effect_kinds.command_effect import CommandEffect
 from jointscope.robots.effect_kinds.inertia_effect import InertiaEffect
 from jointscope.robots.effect_kinds.joint_torque import JointTorque
+from jointscope.robots.effect_kinds.lagging_reading import LaggingReading
 from jointscope.robots.effect_kinds.reading_effect import ReadingEffect
 from jointscope.robots.effect_kinds.robot_torque import RobotTorque
 from jointscope.robots.effect_kinds.smoothed_reading import SmoothedReading
@@ -73,6 +75,8 @@ def columns_of(hypothesis: EffectHypothesis, s: ScoreSignals) -> list[Column]:
         return inertia_columns(hypothesis, s)
     if isinstance(effect, ReadingEffect):
         return [Column(reading=reading_column(hypothesis, s, p.name)) for p in hypothesis.sizes]
+    if isinstance(effect, LaggingReading):
+        return [Column(reading=play_column(hypothesis, s))]
     if isinstance(effect, TimeShift):
         return [Column(reading=late_column(hypothesis, s, p.name)) for p in hypothesis.sizes]
     if isinstance(effect, SmoothedReading):

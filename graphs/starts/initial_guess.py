@@ -27,6 +27,7 @@ from jointscope.graphs.starts.encoder_motion import encoder_motion
 from jointscope.graphs.starts.swinging_links import swinging_links
 from jointscope.robots.dynamics.transmission import joint_angles, motor_angles
 from jointscope.robots.errors import RecordingError
+from jointscope.robots.model.encoder_plays import unlagged
 from jointscope.robots.model.joint_parameters import JointParameters
 from jointscope.robots.model.robot import Robot
 
@@ -45,8 +46,9 @@ BAND = (0.5, 10.0)  # [Hz] the regression uses motion between these frequencies
 
 
 def initial_states(problem: BagProblem, calibration: Calibration) -> Array:
-    """States at all ticks, shape (m + 1, d); bearings do not tilt, memories are empty."""
-    return problem.robot.layout.from_joints(_joint_states(problem, calibration))
+    """States at all ticks, shape (m + 1, d); bearings do not tilt, memories are empty but for lags of encoders."""
+    x = problem.robot.layout.from_joints(_joint_states(problem, calibration))
+    return unlagged(problem.robot, x, dict(zip(calibration.names, calibration.values.tolist(), strict=True)))
 
 
 def _joint_states(problem: BagProblem, calibration: Calibration) -> Array:

@@ -28,6 +28,7 @@ from jointscope.robots.dynamics.joint_springs import JointSprings, Springs
 from jointscope.robots.dynamics.motor_torques import MotorTorques
 from jointscope.robots.dynamics.torque_terms import TorqueTerms
 from jointscope.robots.dynamics.transmission import Transmission, parted
+from jointscope.robots.model.encoder_plays import EncoderPlays
 from jointscope.robots.model.joint_parameters import JointParameters
 from jointscope.robots.model.lasting_torques import LastingTorques
 from jointscope.robots.model.robot import Robot
@@ -45,12 +46,13 @@ class ElasticJoints:
     Attributes:
         names: names of the free parameters, in the order of every parameter vector here.
         layout: of the state.
+        plays: of its encoders, whose lags follow positions from tick to tick; None where there are none.
     """
 
     def __init__(self, robot: Robot):
         robot.need_link_dynamics()
         self.layout = layout = robot.layout
-        self._tree = StructuredTree(robot)
+        self._tree, self.plays = StructuredTree(robot), EncoderPlays.of(robot)
         self._parameters = parameters = JointParameters(robot)
         self.names = parameters.names
         self._motors, self._springs = MotorTorques(robot, parameters), JointSprings(layout, parameters)

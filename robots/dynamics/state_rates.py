@@ -25,6 +25,7 @@ from jointscope.robots.dynamics.torque_terms import TorqueTerms
 from jointscope.robots.dynamics.transmission import Transmission, is_behind
 from jointscope.robots.effect_kinds.joint_torque import JointTorque
 from jointscope.robots.effect_kinds.robot_torque import RobotTorque
+from jointscope.robots.model.encoder_plays import EncoderPlays
 from jointscope.robots.model.joint_parameters import JointParameters
 from jointscope.robots.model.lasting_torques import LastingTorques
 from jointscope.robots.model.robot import Robot
@@ -44,11 +45,15 @@ class StateRates:
         layout: of the state.
         friction_columns: columns of the velocities that the friction of each joint depends on, shape (n,).
         sharpness: k of the friction law of each joint, shape (n,) [s/rad].
+        plays: of its encoders, whose lags follow positions from tick to tick; None where there are none.
+        play_sizes: half of each of them, shape (k,) [rad].
     """
 
     def __init__(self, robot: Robot, values: Mapping[str, float] | None = None):
         self.layout = layout = robot.layout
         named = robot.values | dict(values or {})
+        self.plays = EncoderPlays.of(robot)
+        self.play_sizes = np.zeros(0) if self.plays is None else self.plays.sizes(named)
         parameters, tree = JointParameters(robot), StructuredTree(robot)
         motors = MotorTorques(robot, parameters)
         bodies = tree.bodies(named)

@@ -10,7 +10,7 @@ from jointscope.robots.bodies.rigid_tree import RigidTree
 from jointscope.robots.parts.model_choices import ModelChoices
 from jointscope.robots.parts.parameter import Parameter
 from jointscope.robots.parts.position_target import PositionTarget
-from jointscope.robots.parts.sensors import Accelerometer, Gyro, LinkEncoder, Topic
+from jointscope.robots.parts.sensors import Accelerometer, Gyro, LinkEncoder, MotorEncoder, Topic
 
 
 class RobotView(Protocol):
@@ -55,6 +55,10 @@ class RobotView(Protocol):
     @property
     def targets(self) -> Sequence[PositionTarget]:
         """All targets that a tracker measures."""
+
+    @property
+    def motor_encoder(self) -> MotorEncoder:
+        """The encoders on the motors."""
 
     @property
     def link_encoder(self) -> LinkEncoder | None:

@@ -35,6 +35,7 @@ EFFECT = JointTorque(
         look_alikes={
             "spring_cubic": "both make the spring soft at small and hard at large deflections",
             "hysteresis": "both lag behind after a reversal; hysteresis takes energy, a gap does not",
+            "encoder_hysteresis": "both lag behind after a reversal; play of a sensor moves nothing but its reading",
             "spring_slack": "the same where both ropes are slack by as much, or where zeros of encoders are unknown",
         },
     ),

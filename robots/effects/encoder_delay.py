@@ -54,6 +54,7 @@ EFFECT = EncoderDelay(
         typical="0.1 to 10 ms; of cameras and motion capture 5 to 100 ms",
         excitation="fast oscillation, with another sensor that sees the same joint",
         look_alikes={
+            "encoder_hysteresis": "both trail the motion; play of a sensor by as much at any speed",
             "encoder_filter": "a filter of first order is late, too; the variance is what no delay explains",
             "command_delay": "with the encoder late, motion seems to lag behind the command",
             "motor_lag": "with the encoder late, motion seems to lag behind the command",

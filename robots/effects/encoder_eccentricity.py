@@ -64,6 +64,7 @@ EFFECT = EncoderEccentricity(
         excitation="motion over a good part of a turn of the encoder, with a gyro that sees the joint",
         look_alikes={
             "encoder_harmonics": "over a part of a turn low harmonics bend the reading alike",
+            "encoder_hysteresis": "over few reversals an error by direction is one by position",
             "cogging": "an error of the reading that repeats with the position bends the estimated motion",
             "encoder_scale": "over a small part of a turn the slope of the error is a scale",
             "gyro_scale": "over a small part of a turn the slope of the error is a scale between encoder and gyro",

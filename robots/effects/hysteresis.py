@@ -51,6 +51,7 @@ EFFECT = JointTorque(
             "backlash": "both lag behind after a reversal; hysteresis takes energy, a gap does not",
             "load_dependent_friction": "both take energy out of every change of the load",
             "spring_cubic": "both change the apparent stiffness with the size of the deflection",
+            "encoder_hysteresis": "both read otherwise on the way back; play of a sensor does so without load, too",
             "link_coulomb": "while the motor stands the deflection turns round with the link",
         },
     ),

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """What the sensors read at one state, with Jacobians: the equations of the sensor factors, fast enough for a loop.
 
-    encoder  q_motor + zero + errors of effects, or q_link + zero
+    encoder  q_motor + zero + errors of effects, or q_link + zero; less its lag where it has play
     gyro     R_imu_body omega_body(q_link, v_link) + errors of effects, to which a bias is added
     accelerometer  R_imu_body f_body(q_link, v_link, a_link), to which a bias is added
     torque   scale times that of the springs, and offset
@@ -21,6 +21,7 @@ from numpy.typing import NDArray
 
 from jointscope.robots.effect_kinds.effect import LINK_SIDE
 from jointscope.robots.effect_kinds.reading_effect import ReadingEffect
+from jointscope.robots.model.encoder_plays import EncoderPlays
 from jointscope.robots.model.robot import Robot
 from jointscope.robots.parts.sensors import Accelerometer, Gyro, LinkEncoder, MotorEncoder, Sensor
 
@@ -53,6 +54,9 @@ class ReadingsAtOneState:
         self._link_encoder = robot.link_encoder
         self._links = np.zeros((robot.n, robot.layout.size))
         self._links[np.arange(robot.n), robot.layout.joint_q] = 1.0
+        plays = EncoderPlays.of(robot)
+        for (sensor, channel), column in () if plays is None else zip(plays.seats, plays.lags, strict=True):
+            (self._encoder if sensor == encoder.name else self._links)[channel, column] = -1.0
         self._errors = {name: _errors_of(robot, sensor, values) for name, sensor in robot.sensors.items()}
         self._at: Array | None = None
 

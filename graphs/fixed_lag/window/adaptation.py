@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from jointscope.robots.dynamics.state_rates import StateRates
 from jointscope.robots.effect_kinds.command_effect import CommandEffect
+from jointscope.robots.effect_kinds.lagging_reading import LaggingReading
 from jointscope.robots.effect_kinds.reading_effect import ReadingEffect
 from jointscope.robots.effect_kinds.smoothed_reading import SmoothedReading
 from jointscope.robots.effect_kinds.time_shift import TimeShift
@@ -81,7 +82,7 @@ def checked_densities(robot: Robot, densities: Mapping[str, float]) -> dict[str,
     outside = {
         here.parameter(p.name): here.label
         for here in robot.effects
-        if isinstance(here.effect, ReadingEffect | SmoothedReading | TimeShift | CommandEffect)
+        if isinstance(here.effect, LaggingReading | ReadingEffect | SmoothedReading | TimeShift | CommandEffect)
         for p in here.effect.parameters_at(robot, here.owner)
     }
     for name, density in densities.items():

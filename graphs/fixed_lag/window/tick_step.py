@@ -24,6 +24,7 @@ from scipy.linalg import lapack
 
 from jointscope.graphs.problem.reversals import HALVINGS, turns_sharply
 from jointscope.robots.dynamics.state_rates import StateRates
+from jointscope.robots.model.encoder_plays import EncoderPlays
 
 Array = NDArray[np.float64]
 
@@ -116,7 +117,8 @@ def take_step(
         h: length of the step [s].
         before: rates near the beginning, if they are known.
     """
-    return _halved(model, rule, x0, torque, h, before, HALVINGS if rule == "simpson" else 0)
+    step = _halved(model, rule, x0, torque, h, before, HALVINGS if rule == "simpson" else 0)
+    return step if model.plays is None else _with_lags(model, model.plays, x0, step)
 
 
 def _halved(
@@ -152,6 +154,20 @@ def undivided_step(
         if np.abs(model.sharpness * change[columns]).max() < SMALL_TURN:
             break
     return TickStep(x1, R0, R1, inverse, h * start.C, end)
+
+
+def _with_lags(model: StateRates, plays: EncoderPlays, x0: Array, step: TickStep) -> TickStep:
+    """The step with the lags of encoders, which follow the positions at its two ends; their rows are the last."""
+    after, inside, _ = plays.with_slopes(x0, step.x1, model.play_sizes)
+    x1, R0, R1, inverse = step.x1.copy(), step.by_start.copy(), step.by_end.copy(), step.by_end_inverse.copy()
+    for i, (lag, q) in enumerate(zip(plays.lags, plays.positions, strict=True)):
+        x1[lag] = after[i]
+        R0[lag], R1[lag] = 0.0, 0.0
+        R0[lag, lag], R0[lag, q] = -inside[i], inside[i]
+        R1[lag, lag], R1[lag, q] = 1.0, -inside[i]
+        inverse[lag] = inside[i] * inverse[q]
+        inverse[lag, lag] = 1.0
+    return TickStep(x1, R0, R1, inverse, step.by_torque, step.end)
 
 
 def _simpson(model: StateRates, start: RatesAt, x1: Array, h: float) -> tuple[Array, Array, Array, RatesAt | None]:
