@@ -36,8 +36,8 @@ EXAMPLE = """example:
   jointscope discover tx90l --frequency frequency_P1 frequency_P3 --poses poses.csv -o found.yaml
   jointscope discover arm.yaml train.mcap --poses poses.csv --rests weights -o found.yaml
 
-With motion alone every step is kept as a robot file of its own: found.step0.yaml, found.step1.yaml, ... The same command
-again continues after the last finished step; found.discovery.json remembers what it started from."""
+With motion alone every step is kept as a robot file of its own: found.step0.yaml, found.step1.yaml, ... The same
+command continues after the last finished step; found.discovery.json remembers what it started from."""
 
 MOST_STEPS = 12  # of robots with free links, whose sensors show one effect for each joint and gyro
 
