@@ -8,24 +8,19 @@ kinds read. Where they have other numbers for it (a gap, a bearing, an inertia),
 
 from __future__ import annotations
 
-import copy
 from collections.abc import Mapping
 from dataclasses import replace
-
-from ruamel.yaml.comments import CommentedMap
 
 from jointscope.graphs.across_kinds.said_by_kinds import MOTION, RESTS, AcrossKinds
 from jointscope.robots.effect_kinds.effect_at import EffectAt
 from jointscope.robots.files.effect_catalogue import catalogue
-from jointscope.robots.files.effect_editing import add_effect, cannot_be_added, carried_noise, remove_effect
+from jointscope.robots.files.effect_editing import add_effect, cannot_be_added, remove_effect
+from jointscope.robots.files.elastic_joint import ELASTICITY, with_spring
 from jointscope.robots.geometry.added_effect import with_effect
 from jointscope.robots.geometry.arm_effects import FREQUENCY, POSES, ArmHypothesis
-from jointscope.robots.geometry.error_parameters import DAMPING, STIFFNESS
+from jointscope.robots.geometry.error_parameters import STIFFNESS
 from jointscope.robots.model.robot import Robot
 from jointscope.robots.parts.parameter import Parameter
-
-ELASTICITY = "joint_elasticity"
-SPREAD = 1.1  # of the stiffness of a spring that is new, 1 sigma over its value
 
 
 def with_shared_effect(
@@ -48,7 +43,7 @@ def with_shared_effect(
         begin = f"{owner}.{effect}."
         start |= {n.removeprefix(begin): p.value for n, p in refit.parameters.items() if n.startswith(begin)}
     if effect == ELASTICITY and hypothesis is not None and owner in robot.choices.rigid_joints:
-        return _with_spring(robot, owner, start)
+        return with_spring(robot, owner, start)
     grown = robot
     if hypothesis is None or _of_catalogue(robot, effect, owner):
         known = add_effect(robot, found.label, start)
@@ -106,20 +101,3 @@ def _of_arm(hypothesis: ArmHypothesis, start: Mapping[str, float]) -> dict[str, 
         else:
             found[name] = start[last]
     return found
-
-
-def _with_spring(robot: Robot, joint: str, start: Mapping[str, float]) -> Robot:
-    """The robot with a joint that is not rigid any more."""
-    known = catalogue()[ELASTICITY].parameters_at(robot, joint)
-    usual = {p.name: p.start for p in known}
-    stiffness = 1.0 / start.get("compliance", usual["compliance"])
-    springs = {STIFFNESS: (stiffness, "N m/rad"), DAMPING: (start.get(DAMPING, usual[DAMPING]), "N m s/rad")}
-    parameters = dict(robot.parameters)
-    for part, (value, unit) in springs.items():
-        name = f"{joint}.{part}"
-        parameters[name] = Parameter(name, value, unit, value, SPREAD * value, effect=ELASTICITY)
-    left = tuple(each for each in robot.choices.rigid_joints if each != joint)
-    document = copy.deepcopy(robot.document)
-    document.setdefault("model", CommentedMap())["rigid_joints"] = list(left)
-    new = replace(robot, parameters=parameters, choices=replace(robot.choices, rigid_joints=left), document=document)
-    return replace(new, noise=carried_noise(robot, new))
