@@ -14,8 +14,10 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from math import isfinite, log
 
-from jointscope.graphs.discovery.diagnosis_result import Diagnosis
+from jointscope.graphs.discovery.diagnosis_result import Candidate, Diagnosis
+from jointscope.graphs.discovery.verdicts import HORIZON
 from jointscope.graphs.joint_kinds.effect_judge import ArmCandidate
 from jointscope.graphs.rest_search.rest_judge import RestCandidate
 from jointscope.robots.geometry.arm_effects import KINDS
@@ -23,6 +25,7 @@ from jointscope.robots.geometry.error_parameters import STIFFNESS
 
 MOTION, RESTS = "motion", "rests"
 APART, SHARE = 3.0, 0.5  # [sigma], share of the larger one: from both on sizes in two kinds contradict each other
+LEAST_LEFT = 1e-6  # share of squares, of which a smaller one would say no more
 ORDER = ("missing", "possible", "absent", "untestable")
 Size = tuple[float, float, str]
 """Value, sigma, unit."""
@@ -37,12 +40,14 @@ class Said:
         sizes: of its parameters, by the last part of their names.
         look_alikes: labels of effects that do the same in this kind.
         why: why it is untestable.
+        evidence: twice the logarithm of how much likelier what was left out becomes; 0 where that is not known.
     """
 
     verdict: str
     sizes: Mapping[str, Size]
     look_alikes: tuple[str, ...] = ()
     why: str = ""
+    evidence: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -66,6 +71,16 @@ class AcrossKinds:
     def shown_by(self) -> tuple[str, ...]:
         """Kinds in which it is missing."""
         return tuple(kind for kind, said in self.by_kind.items() if said.verdict == "missing")
+
+    @property
+    def evidence(self) -> float:
+        """Of all kinds that show it: twice the logarithm of how much likelier left-out recordings become."""
+        return sum(self.by_kind[kind].evidence for kind in self.shown_by)
+
+    @property
+    def seen_by(self) -> tuple[str, ...]:
+        """Kinds in which it does anything."""
+        return tuple(kind for kind, said in self.by_kind.items() if said.verdict != "untestable")
 
     @property
     def verdict(self) -> str:
@@ -141,21 +156,30 @@ def _contradicts(one: Said, other: Said) -> bool:
 
 def said_by_motion(found: Diagnosis) -> dict[str, Said]:
     """What recordings of motion say, by label."""
+    seconds = sum(recording.duration for recording in found.recordings)
     return {
         c.label: Said(
             c.verdict,
             {name: (p.value, p.sigma, p.unit) for name, p in c.parameters.items()},
             c.look_alikes,
             " ".join(c.reasons) if c.verdict == "untestable" else "",
+            _evidence_of_motion(c, seconds),
         )
         for c in found.candidates
         if not c.numerics
     }
 
 
+def _evidence_of_motion(c: Candidate, seconds: float) -> float:
+    """By the errors of predictions that do not overlap, or by as many torques where these are judged."""
+    if isfinite(c.bic):
+        return -c.bic
+    return -seconds / HORIZON * log(max(1.0 - c.share, LEAST_LEFT)) if isfinite(c.share) else 0.0
+
+
 def said_by_rests(candidates: Iterable[RestCandidate]) -> dict[str, Said]:
     """What rests say, by label."""
-    return {c.label: Said(c.verdict, c.sizes, c.look_alikes, c.why) for c in candidates}
+    return {c.label: Said(c.verdict, c.sizes, c.look_alikes, c.why, 2.0 * c.gain) for c in candidates}
 
 
 def said_by_arm(candidates: Sequence[ArmCandidate], kinds: Sequence[str]) -> dict[str, dict[str, Said]]:
@@ -170,12 +194,15 @@ def said_by_arm(candidates: Sequence[ArmCandidate], kinds: Sequence[str]) -> dic
         unit = "rad/(N m)" if c.hypothesis.kind.soft else c.hypothesis.kind.unit
         pairs = zip(c.hypothesis.names, c.sizes, c.sigmas, strict=True)
         sizes = {_last_part(name, c.hypothesis.kind.soft): (value, sigma, unit) for name, value, sigma in pairs}
+        evidence = c.evidence  # of both kinds together: it counts once
         for kind in kinds:
             unseen = c.hypothesis.kind.unseen.get(kind, "")
             verdict = "untestable" if unseen else c.verdict
             if verdict == "missing" and len(kinds) > 1 and kind not in c.shown_by:
                 verdict = "possible"
-            found[kind][c.hypothesis.label] = Said(verdict, sizes, c.alone.get(kind, c.look_alikes), unseen)
+            alike = c.alone.get(kind, c.look_alikes)
+            found[kind][c.hypothesis.label] = Said(verdict, sizes, alike, unseen, evidence)
+            evidence = 0.0 if verdict == "missing" else evidence
     return found
 
 

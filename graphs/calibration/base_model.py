@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -71,6 +71,7 @@ class BaseModel:
         *,
         by_torques: bool | None = None,
         solver: Solver = solve,
+        calibration: Callable[..., CalibrationResult] = calibrate,
     ) -> BaseModel:
         """Calibrates a robot.
 
@@ -80,6 +81,7 @@ class BaseModel:
             start: a model of the same recordings whose values are near; nothing is guessed anew.
             by_torques: see there; as the start where there is one, else wherever the robot allows it.
             solver: minimises the cost of all samples.
+            calibration: `calibrate`, or what calibrates with recordings of other kinds in the same graph.
         """
         if by_torques is None:
             by_torques = start.by_torques if start is not None else seen_by_one_encoder(robot)
@@ -90,7 +92,7 @@ class BaseModel:
         near = [calibration for calibration in start.calibrations] if start is not None else None
         # motors behind which links swing that nobody sees tell of these while they move
         moving = by_torques or (seen_by_one_encoder(full) and len(full.noise.unseen) > 0)
-        result = calibrate(full, recordings, near=near, standstill=not moving, memory=False, solver=solver)
+        result = calibration(full, recordings, near=near, standstill=not moving, memory=False, solver=solver)
         return BaseModel(
             result.robot,
             tuple(recordings),

@@ -14,7 +14,6 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from jointscope.factors.calibration import Calibration
 from jointscope.graphs.frequency.calibrate_frequency import calibrate_frequency
 from jointscope.graphs.frequency.compare_frequency import FrequencyErrors, frequency_errors
 from jointscope.graphs.frequency.frequency_set import BAND
@@ -24,7 +23,7 @@ from jointscope.graphs.joint_kinds.effect_judge import ArmCandidate
 from jointscope.graphs.joint_kinds.spring_screen import badly_explained, screened_springs
 from jointscope.graphs.poses.calibrate_poses import PoseCalibration, calibrate_poses
 from jointscope.graphs.poses.pose_set import PoseSet
-from jointscope.graphs.poses.tip_errors import TipErrors, summary, tip_errors
+from jointscope.graphs.poses.tip_errors import TipErrors, summary, tip_errors, whitened
 from jointscope.graphs.poses.tracker_start import placed
 from jointscope.graphs.poses.trimmed_poses import squared_distances
 from jointscope.robots.errors import SolveError
@@ -92,13 +91,7 @@ class ArmDiscovery:
 
     def whitened(self, step: ArmStep, sessions: Sequence[PoseSet]) -> float:
         """Root mean square error of a model on poses, per coordinate [sigma of the last model's noise]; 1 is noise."""
-        found, counts = [], []
-        for problem in sessions:
-            robot = replace(step.calibrated.robot, poses=self.robot.poses)
-            other = replace(problem, robot=robot, repeatability=1.0, turning=1.0)
-            found.append(squared_distances(other, other.start(Calibration.of(robot))[1]))
-            counts.append(other.targets.there.sum(axis=1))
-        return float(np.sqrt(np.mean(np.concatenate(found)) / np.mean(np.concatenate(counts))))
+        return whitened(step.calibrated.robot, self.robot.poses, sessions)
 
 
 def discover_arm(

@@ -10,7 +10,7 @@ to 14). Derivatives are those of the equilibrium: what moves the arm moves its w
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -40,6 +40,7 @@ class SaggingPoint:
         by_value: by each parameter in its unit, by name, shape (m, k).
         sag: how far the target is from where a rigid arm would have it, shape (m, 3) [m].
         turn: orientation of the link of the target, shape (m, 3, 3).
+        others: the same of the origins of other links that carry targets, by the number of the joint before them.
     """
 
     target: Array
@@ -47,6 +48,7 @@ class SaggingPoint:
     by_value: Mapping[str, Array]
     sag: Array
     turn: Array
+    others: Mapping[int, SaggingPoint] = field(default_factory=dict)
 
 
 class SaggingArm:
@@ -65,7 +67,9 @@ class SaggingArm:
     def __init__(self, robot: Robot):
         if robot.poses is None:
             raise RobotError(no_poses(robot))
-        self.chain = ArmChain(robot.tree, robot.poses.link, robot.poses.at)
+        links = [target.link for target in robot.poses.targets]
+        self.chain = ArmChain(robot.tree, robot.poses.link, robot.poses.at, links)
+        self._others = sorted({*self.chain.levels} - {self.chain.level})
 
     def at(self, q: Array, e: Array, values: Mapping[str, float], turning: bool = False) -> SaggingPoint:
         """The target for angles and transmission errors of the chain's joints, shape (m, n) each [rad].
@@ -87,13 +91,22 @@ class SaggingArm:
             if np.max(np.abs(now - last), initial=0.0) < SETTLED:
                 break
             last = now
-        by_error, by_yield = _by_error(chain, point, turning), _by_yield(point, turning)
-        if parts.some:
-            by_error, by_yield = _following(chain, point, parts, by_error, by_yield)
-        by_value = {**by_error, **parts.columns(q, point, by_yield)}
-        by_joint = by_yield[:, :, : len(chain.joints)]
-        turn = np.stack([point.by_error[f"{TOOL}.{part}"] for part in LENGTHS], axis=2)
-        return SaggingPoint(point.target, by_joint, by_value, point.target - rigid.target, turn)
+        following = _Following.of(chain, point, parts) if parts.some else None
+
+        def seen(there: ChainPoint, turning: bool, turn: Array, sag: Array) -> SaggingPoint:
+            by_error, by_yield = _by_error(chain, there, turning), _by_yield(there, turning)
+            if following is not None:
+                by_error, by_yield = following.of_all(by_error, by_yield)
+            by_value = {**by_error, **parts.columns(q, there, by_yield)}
+            return SaggingPoint(there.target, by_yield[:, :, : len(chain.joints)], by_value, sag, turn)
+
+        turn = np.stack([point.steps[f"{TOOL}.{part}"] for part in LENGTHS], axis=2)
+        found = seen(point, turning, turn, point.target - rigid.target)
+        if not (turning and self._others):
+            return found
+        sags = point.origins - rigid.origins
+        others = {k: seen(point.on_link(chain.joints, k), True, point.frames[:, k], sags[:, k]) for k in self._others}
+        return replace(found, others=others)
 
 
 def _by_yield(point: ChainPoint, turning: bool) -> Array:
@@ -101,7 +114,9 @@ def _by_yield(point: ChainPoint, turning: bool) -> Array:
     by_yield = np.concatenate([point.by_joint, point.by_bearing[..., 0], point.by_bearing[..., 1]], axis=2)
     if not turning:
         return by_yield
-    axes = np.concatenate([point.turns[:, :, k] for k in YIELDING], axis=1)
+    turns = point.turns.copy()
+    turns[:, point.level + 1 :] = 0.0
+    axes = np.concatenate([turns[:, :, k] for k in YIELDING], axis=1)
     return np.concatenate([by_yield, np.swapaxes(axes, 1, 2)], axis=1)
 
 
@@ -109,27 +124,43 @@ def _by_error(chain: ArmChain, point: ChainPoint, turning: bool) -> Mapping[str,
     """Derivative of the target by each geometric error, shape (m, k); its own orientation is none of the tool."""
     if not turning:
         return point.by_error
-    places = [(j, k) for j in range(len(chain.joints)) for k in range(len(ANGLES))]
+    places = [(j, k) for j in range(point.level + 1) for k in range(len(ANGLES))]
     axes = {f"{chain.joints[j]}.{ANGLES[k]}": point.turns[:, j, k] for j, k in places}
     still = np.zeros_like(point.target)
     return {name: np.hstack([column, axes.get(name, still)]) for name, column in point.by_error.items()}
 
 
-def _following(
-    chain: ArmChain, point: ChainPoint, parts: WhatGivesWay, by_error: Mapping[str, Array], by_yield: Array
-) -> tuple[Mapping[str, Array], Array]:
-    """Derivatives by geometry and masses, and by what gives way, when everything soft follows gravity.
+@dataclass(frozen=True)
+class _Following:
+    """How everything soft follows gravity.
 
-    Deflections x = C tau(x, v) make the target move by T (1 - C H)^-1 C dtau/dv beside what it does itself.
+    Deflections x = C tau(x, v) make a target move by T (1 - C H)^-1 C dtau/dv beside what it does itself.
+
+    Attributes:
+        soft: C, shape (m, 3 n).
+        kept: 1 - C H, transposed, shape (m, 3 n, 3 n).
+        by_value: dtau/dv by name, shape (m, 3 n) each.
     """
-    slopes, soft = gravity_slopes(chain.joints, point, chain.gravity_vector), parts.softness(point)
-    kept = np.eye(soft.shape[1]) - soft[:, :, None] * slopes.by_turn
-    by_yield = np.swapaxes(np.linalg.solve(np.swapaxes(kept, 1, 2), np.swapaxes(by_yield, 1, 2)), 1, 2)
-    by_load = by_yield * soft[:, None]
-    found = {name: np.einsum("mka,ma->mk", by_load, slope) for name, slope in slopes.by_value.items()}
-    still = np.zeros(by_yield.shape[:2])
-    names = dict.fromkeys([*by_error, *found])
-    return {name: by_error.get(name, still) + found.get(name, still) for name in names}, by_yield
+
+    soft: Array
+    kept: Array
+    by_value: Mapping[str, Array]
+
+    @staticmethod
+    def of(chain: ArmChain, point: ChainPoint, parts: WhatGivesWay) -> _Following:
+        """At the equilibrium of an arm."""
+        slopes, soft = gravity_slopes(chain.joints, point, chain.gravity_vector), parts.softness(point)
+        kept = np.eye(soft.shape[1]) - soft[:, :, None] * slopes.by_turn
+        return _Following(soft, np.swapaxes(kept, 1, 2), slopes.by_value)
+
+    def of_all(self, by_error: Mapping[str, Array], by_yield: Array) -> tuple[Mapping[str, Array], Array]:
+        """Derivatives by geometry and masses, and by what gives way, with what gravity answers."""
+        by_yield = np.swapaxes(np.linalg.solve(self.kept, np.swapaxes(by_yield, 1, 2)), 1, 2)
+        by_load = by_yield * self.soft[:, None]
+        found = {name: np.einsum("mka,ma->mk", by_load, slope) for name, slope in self.by_value.items()}
+        still = np.zeros(by_yield.shape[:2])
+        names = dict.fromkeys([*by_error, *found])
+        return {name: by_error.get(name, still) + found.get(name, still) for name in names}, by_yield
 
 
 def in_tracker(
@@ -153,4 +184,5 @@ def in_tracker(
         by_value |= {name: shares[:, None] * axis for name, axis in zip(DRIFT, axes, strict=True)}
         shift = shift + shares[:, None] * np.array([values[name] for name in DRIFT])
     seen = (point.target - o) @ R + shift
-    return SaggingPoint(seen, each.T @ point.by_joint, by_value, point.sag @ R, R.T @ point.turn)
+    others = {n: in_tracker(other, base_from_tracker, values, shares) for n, other in point.others.items()}
+    return SaggingPoint(seen, each.T @ point.by_joint, by_value, point.sag @ R, R.T @ point.turn, others)

@@ -105,16 +105,17 @@ def _is_known(problem: PoseSet, mount: Mount) -> bool:
 def _predicted(problem: PoseSet, name: str) -> Array:
     """Places of a target in the axes of the tracker, shape (m, 3)."""
     (point, values), found = tool_seen(problem), mounts(problem.robot)
-    first = next(iter(found.values()))
-    return np.asarray(point.target + point.turn @ (found[name].place(values) - first.place(values)))
+    first, link = next(iter(found.values())), found[name].on(point)
+    return np.asarray(link.target + link.turn @ found[name].away(first, values))
 
 
 def _check_units(problem: PoseSet) -> None:
     """Some targets may be in millimetres; where all are, that is told of the first."""
-    tool, wrong = tool_seen(problem)[0].target, []
+    (tool, _), found, wrong = tool_seen(problem), mounts(problem.robot), []
     for s in problem.targets.sightings:
         there = np.isfinite(s.place[:, 0])
-        apart = [float(np.linalg.norm(np.std(x[there], axis=0))) for x in (s.place, tool)]
+        link = found[s.name].on(tool).target
+        apart = [float(np.linalg.norm(np.std(x[there], axis=0))) for x in (s.place, link)]
         if there.sum() >= FEWEST and MILLI[0] < apart[0] / max(apart[1], 1e-12) < MILLI[1]:
             wrong.append(s.name)
     if wrong and len(wrong) < len(problem.targets.sightings):
@@ -161,7 +162,7 @@ def _check_names(problem: PoseSet, one: Sighting, other: Sighting) -> None:
 
 
 def _check_place(problem: PoseSet, sighting: Sighting, mount: Mount) -> None:
-    point, _ = tool_seen(problem)
+    point = mount.on(tool_seen(problem)[0])
     there = np.isfinite(sighting.place[:, 0])
     away = (sighting.place - _predicted(problem, sighting.name))[there]
     misses = float(np.sqrt(np.mean(np.sum(away**2, axis=1))))
@@ -181,13 +182,14 @@ def _check_place(problem: PoseSet, sighting: Sighting, mount: Mount) -> None:
     assert problem.robot.poses is not None
     target = next(target for target in problem.robot.poses.targets if target.name == sighting.name)
     hint = "check the names of the targets, and the link that carries it"
+    where = "the tool" if mount.joint is None else target.link
     if left < LARGEST_ERROR / 5.0 and target.at is not None:
         x, y, z = (f"{v:.3g}" for v in target.at + shift)
         hint = (
             f"at [{x}, {y}, {z}] of {target.link} it fits to {1e3 * left:.2g} mm; leave out its `at`, and it is found"
         )
     raise RecordingError(
-        f"{problem.poses.path}: the target {sighting.name} is not where {problem.robot.path.name} has it on the tool, "
+        f"{problem.poses.path}: the target {sighting.name} is not where {problem.robot.path.name} has it on {where}, "
         f"it is off by {1e3 * misses:.3g} mm; {hint}"
     )
 
@@ -196,7 +198,7 @@ def _check_turns(problem: PoseSet, sighting: Sighting, measured: Array, mount: M
     there = np.isfinite(measured[:, 0, 0])
     if there.sum() < FEWEST:
         return
-    G, M = (tool_seen(problem)[0].turn @ mount.R_link)[there], measured[there]
+    G, M = (mount.on(tool_seen(problem)[0]).turn @ mount.R_link)[there], measured[there]
     name, path = sighting.name, problem.poses.path
     left = _fits(G, M)
     far = np.zeros(len(there), bool)

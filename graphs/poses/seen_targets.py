@@ -6,7 +6,8 @@
 
 R turns the link of the first target; a_i and M_i, where target i sits on the tool, are in its axes, l_i and the angles
 are errors of that. The tool is one body: whatever moves the first target by v and turns the tool by w moves target i by
-v + w x (p_i - p_1). Rows of a target that was not seen are zero.
+v + w x (p_i - p_1). A target on another link of the arm hangs on the origin of that link in the same way (a_1 = l_1 =
+0): joints behind it move it only as their weight does. Rows of a target that was not seen are zero.
 """
 
 from __future__ import annotations
@@ -20,7 +21,7 @@ from numpy.typing import NDArray
 from jointscope.graphs.poses.sagging_arm import SaggingPoint
 from jointscope.robots.bodies.misplaced_joints import ANGLES, LENGTHS, across, turned
 from jointscope.robots.errors import RecordingError
-from jointscope.robots.geometry.arm_chain import cross
+from jointscope.robots.geometry.arm_chain import ArmChain, cross
 from jointscope.robots.geometry.error_parameters import TOOL
 from jointscope.robots.geometry.rotations import log_slopes, rotation_vectors
 from jointscope.robots.model.robot import Robot
@@ -34,16 +35,38 @@ Block = tuple[Array, Array, dict[str, Array]]
 
 @dataclass(frozen=True)
 class Mount:
-    """A target on the tool: owner of its errors, R_tool_link and R_link_target, and its place in axes of the tool."""
+    """Where a target is mounted.
+
+    Attributes:
+        owner: of its errors.
+        R_link: R_tool_link; of a target on another link, the axes of that link in those of its joint.
+        R_target: R_link_target.
+        at: its place in axes of the tool, or from the origin of the joint before its link, shape (3,) [m].
+        joint: number of that joint in the chain; None of a target on the tool.
+    """
 
     owner: str
     R_link: Array
     R_target: Array
     at: Array
+    joint: int | None = None
 
     def place(self, values: Mapping[str, float]) -> Array:
-        """In the axes of the link of the first target, shape (3,) [m]."""
+        """In the axes of what carries it, shape (3,) [m]."""
         return np.asarray(self.at + self.R_link @ [values.get(f"{self.owner}.{part}", 0.0) for part in LENGTHS])
+
+    def on(self, point: SaggingPoint) -> SaggingPoint:
+        """What carries it: the tool with the first target, or another link with its origin."""
+        return point if self.joint is None else point.others[self.joint]
+
+    def away(self, first: Mount, values: Mapping[str, float]) -> Array:
+        """From the target of what carries it, in its axes, shape (3,) [m].
+
+        Args:
+            first: mount of the first target.
+            values: of all parameters.
+        """
+        return self.place(values) - (first.place(values) if self.joint is None else 0.0)
 
 
 class SeenTargets:
@@ -129,15 +152,16 @@ class SeenTargets:
         return _together(point, blocks, self.there)
 
     def _place(self, point: SaggingPoint, values: Mapping[str, float], mount: Mount) -> Block:
-        first = next(iter(self._mounts.values()))
-        away = point.turn @ (mount.place(values) - first.place(values))
+        first, point = next(iter(self._mounts.values())), mount.on(point)
+        away = point.turn @ mount.away(first, values)
         axes = np.swapaxes(point.by_joint, 1, 2)
         by_joint = axes[:, :, :3] + cross(axes[:, :, 3:], away[:, None])
         by_value = {name: column[:, :3] + cross(column[:, 3:], away) for name, column in point.by_value.items()}
         if mount is not first:
             own = point.turn @ mount.R_link
             for k, part in enumerate(LENGTHS):
-                by_value[f"{TOOL}.{part}"] = by_value[f"{TOOL}.{part}"] - point.turn[:, :, k]
+                if mount.joint is None:
+                    by_value[f"{TOOL}.{part}"] = by_value[f"{TOOL}.{part}"] - point.turn[:, :, k]
                 by_value[f"{mount.owner}.{part}"] = own[:, :, k]
         return point.target + away, np.swapaxes(by_joint, 1, 2), by_value
 
@@ -157,21 +181,24 @@ class SeenTargets:
 
 
 def mounts(robot: Robot) -> dict[str, Mount]:
-    """Where the targets of a robot are on its tool, by name; the first one first."""
+    """Where the targets of a robot are on its tool and its links, by name; the first one first."""
     setup, tree = robot.poses, robot.tree
     assert setup is not None
+    chain = ArmChain(tree, setup.link, setup.at, [target.link for target in setup.targets])
     frames = [tree.model.frames[tree.frame_id(target.link)].placement for target in setup.targets]
     found = {}
-    for i, (target, frame) in enumerate(zip(setup.targets, frames, strict=True)):
-        T, at = frames[0].actInv(frame), np.zeros(3) if target.at is None else target.at
+    for i, (target, frame, level) in enumerate(zip(setup.targets, frames, chain.levels, strict=True)):
+        on_tool = level == chain.level
+        T, at = frames[0].actInv(frame) if on_tool else frame, np.zeros(3) if target.at is None else target.at
         turn = np.eye(3) if target.turn is None else target.turn
-        owner = target.name if i else TOOL
-        found[target.name] = Mount(owner, np.array(T.rotation), turn, np.array(T.translation) + T.rotation @ at)
+        owner, place = target.name if i else TOOL, np.array(T.translation) + T.rotation @ at
+        found[target.name] = Mount(owner, np.array(T.rotation), turn, place, None if on_tool else level)
     return found
 
 
 def _turn(point: SaggingPoint, values: Mapping[str, float], mount: Mount, measured: Array) -> Block:
     """The turn from the measured orientation of a target to the predicted one."""
+    point = mount.on(point)
     R, own = point.turn @ mount.R_link @ mount.R_target, {}
     along, x, y = across(np.array([0.0, 0.0, 1.0]))
     for part, axis in zip(ANGLES, (y, x, along), strict=True):

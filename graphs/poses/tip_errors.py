@@ -14,8 +14,10 @@ from numpy.typing import NDArray
 
 from jointscope.factors.calibration import Calibration
 from jointscope.graphs.poses.pose_set import PoseSet, contact_block
+from jointscope.graphs.poses.trimmed_poses import squared_distances
 from jointscope.robots.geometry.error_parameters import BACKLASH, BEARING, STIFFNESS
 from jointscope.robots.model.robot import Robot
+from jointscope.robots.parts.pose_setup import PoseSetup
 
 Array = NDArray[np.float64]
 
@@ -155,3 +157,19 @@ def summary(errors: Sequence[TipErrors]) -> TipErrors:
         np.concatenate([each.turned + end for each, end in zip(errors, ends, strict=True)]),
         tuple(name for each in errors for name in each.turned_names),
     )
+
+
+def whitened(robot: Robot, noise: PoseSetup | None, sessions: Sequence[PoseSet]) -> float:
+    """Root mean square error of a model on poses, per coordinate [sigma]; 1 is noise.
+
+    Args:
+        robot: the model.
+        noise: how large it is.
+        sessions: the poses.
+    """
+    found, counts = [], []
+    for problem in sessions:
+        other = replace(problem, robot=replace(robot, poses=noise), repeatability=1.0, turning=1.0)
+        found.append(squared_distances(other, other.start(Calibration.of(robot))[1]))
+        counts.append(other.targets.there.sum(axis=1))
+    return float(np.sqrt(np.mean(np.concatenate(found)) / np.mean(np.concatenate(counts))))

@@ -78,11 +78,12 @@ def _with_trackers(robot: Robot, sessions: Sequence[Poses]) -> tuple[Robot, list
 def _known_points(problem: PoseSet) -> tuple[Array, Array]:
     """Places of targets that are known on the tool: predicted in the base frame, and measured, shape (s, 3) each."""
     values, robot = problem.values(Calibration.of(problem.robot)), problem.robot
-    point, (first, *others) = problem.arm.at(problem.q, np.zeros_like(problem.q), values), mounts(robot).items()
+    point, (first, *others) = problem.arm.at(problem.q, np.zeros_like(problem.q), values, True), mounts(robot).items()
     predicted = {first[0]: point.target}
     for name, mount in others:
         if not is_open(robot, mount.owner):
-            predicted[name] = point.target + point.turn @ (mount.place(values) - first[1].place(values))
+            link = mount.on(point)
+            predicted[name] = link.target + link.turn @ mount.away(first[1], values)
     seen = [sighting for sighting in problem.targets.sightings if sighting.name in predicted]
     known = [(predicted[s.name], s.place, np.isfinite(s.place[:, 0])) for s in seen]
     if not known:
@@ -109,8 +110,9 @@ def _with_other_targets(robot: Robot, problems: Sequence[PoseSet]) -> Robot:
         shifts = [np.zeros((0, 3))]
         for problem, sighting in _sightings(problems, name):
             tool, known = tool_seen(problem)
-            away = np.einsum("mji,mj->mi", tool.turn, sighting.place - tool.target)
-            shifts.append((away + first.place(known) - mount.at) @ mount.R_link)
+            link, begin = mount.on(tool), mount.away(first, known) - mount.place(known)
+            away = np.einsum("mji,mj->mi", link.turn, sighting.place - link.target)
+            shifts.append((away - begin - mount.at) @ mount.R_link)
         seen = np.concatenate(shifts)
         seen = seen[np.isfinite(seen[:, 0])]
         if len(seen):
@@ -144,15 +146,15 @@ def on_tool(problems: Sequence[PoseSet], name: str, mount: Mount) -> Array:
     for problem, sighting in _sightings(problems, name):
         if sighting.turn is not None:
             seen = np.isfinite(sighting.turn[:, 0, 0])
-            R_tracker_link = tool_seen(problem)[0].turn @ mount.R_link
+            R_tracker_link = mount.on(tool_seen(problem)[0]).turn @ mount.R_link
             found.append((np.swapaxes(R_tracker_link, 1, 2) @ sighting.turn)[seen])
     return np.concatenate(found)
 
 
 def tool_seen(problem: PoseSet) -> tuple[SaggingPoint, dict[str, float]]:
-    """The tool in the axes of the tracker at the robot's values, and these."""
+    """The tool and other links with targets in the axes of the tracker at the robot's values, and these."""
     values = problem.values(Calibration.of(problem.robot))
-    point = problem.arm.at(problem.q, np.zeros_like(problem.q), values)
+    point = problem.arm.at(problem.q, np.zeros_like(problem.q), values, True)
     return in_tracker(point, problem.tracker, values, problem.poses.shares), values
 
 

@@ -22,6 +22,7 @@ from jointscope.factors.calibration import Calibration
 from jointscope.graphs.poses.linear_poses import LinearPoses
 from jointscope.graphs.poses.pose_set import PoseSet
 from jointscope.graphs.poses.sagging_arm import in_tracker
+from jointscope.graphs.poses.seen_targets import mounts
 
 Array = NDArray[np.float64]
 FEWEST = 4  # poses on each side of a step
@@ -43,7 +44,7 @@ class Step:
         size: of the shift [m], or of the turn [rad]; of a joint how much more it reads, negative if less.
         turned: whether it is a turn.
         joint: whose zero moved; empty where something else did.
-        mimic: what would look the same.
+        mimic: what would look the same; of a target the link that carries it, "" for the tool.
     """
 
     path: str
@@ -78,7 +79,7 @@ class Step:
                 f"moved; give poses up to {self.before} and the others as two tables, without `tracker` in the robot "
                 "file"
             )
-        how = f"{'turned' if self.turned else 'shifted'} on the tool by {1e3 * self.size:.2g}"
+        how = f"{'turned' if self.turned else 'shifted'} on {self.mimic or 'the tool'} by {1e3 * self.size:.2g}"
         return (
             f"{since} the target {self.target} is {how} {'mrad' if self.turned else 'mm'}: it slipped, or poses of "
             "another kind begin there and an effect is missing; leave out its rows from there on, or up to "
@@ -254,23 +255,26 @@ def _jumps(problem: PoseSet, calibration: Calibration) -> Iterator[_Shift]:
     by_joint, joints = problem.point(calibration).by_joint, problem.arm.chain.joints
     for j, joint in enumerate(joints):
         mimic = ", the tracker or the base was turned about its axis" if j == 0 and not problem.contacts else ""
-        mimic += ", the target slipped about its axis" if j == len(joints) - 1 else ""
+        mimic += ", the target slipped about its axis" if j == problem.arm.chain.level else ""
         yield _Shift("", True, by_joint[:, :, j : j + 1], joint, mimic)
 
 
 def _shifts(problem: PoseSet, calibration: Calibration) -> Iterator[_Shift]:
     """Of all targets in axes of the tracker, at once or by and by, and of each on the tool."""
     values, seen = problem.values(calibration), problem.targets
-    tool = problem.arm.at(problem.q, np.zeros_like(problem.q), values)
-    R = in_tracker(tool, problem.tracker, values, problem.poses.shares).turn
-    there, owners = seen.there.reshape(len(R), -1, 3)[:, :, :1, None], seen.owners[::3]
-    blocks = np.zeros((len(R), len(owners), 3, 3))
+    tool = problem.arm.at(problem.q, np.zeros_like(problem.q), values, True)
+    tool = in_tracker(tool, problem.tracker, values, problem.poses.shares)
+    m, mounted = len(tool.turn), mounts(problem.robot)
+    assert problem.robot.poses is not None
+    links = {t.name: t.link for t in problem.robot.poses.targets if mounted[t.name].joint is not None}
+    there, owners = seen.there.reshape(m, -1, 3)[:, :, :1, None], seen.owners[::3]
+    blocks = np.zeros((m, len(owners), 3, 3))
     turns = seen.turns[::3]
     blocks[:, ~turns] = np.eye(3)
-    all_shifted = (there * blocks).reshape(len(R), -1, 3)
+    all_shifted = (there * blocks).reshape(m, -1, 3)
     yield _Shift("", False, all_shifted)
     yield _Shift("", False, problem.poses.shares[:, None, None] * all_shifted, drifts=True)
     for i, (target, turned) in enumerate(zip(owners, turns, strict=True)):
-        blocks = np.zeros((len(R), len(owners), 3, 3))
-        blocks[:, i] = R
-        yield _Shift(target, bool(turned), (there * blocks).reshape(len(R), -1, 3))
+        blocks = np.zeros((m, len(owners), 3, 3))
+        blocks[:, i] = mounted[target].on(tool).turn
+        yield _Shift(target, bool(turned), (there * blocks).reshape(m, -1, 3), mimic=links.get(target, ""))

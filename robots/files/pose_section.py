@@ -99,11 +99,15 @@ def with_poses(robot: Robot, setup: PoseSetup) -> Robot:
                 f"{place}: poses.tracker: {setup.tracker_link} moves with the arm; expected a link of the base"
             )
         setup = replace(setup, tracker=np.array(frame.placement.homogeneous))
-    joints = ArmChain(robot.tree, setup.link, setup.at).joints
+    _must_be_links(robot.tree, setup, place)
+    try:
+        joints = ArmChain(robot.tree, setup.link, setup.at, [target.link for target in setup.targets]).joints
+    except RobotError as err:
+        raise RobotError(f"{place}: section poses: {err}") from None
     errors = error_parameters(joints, setup.length_sigma, setup.angle_sigma, setup.other_names)
     for part in LENGTHS:
         errors[f"{TOOL}.{part}"] = replace(errors[f"{TOOL}.{part}"], prior_sigma=setup.tool_sigma)
-    errors |= _placed_targets(robot.tree, setup, errors, place)
+    errors |= _placed_targets(setup, errors)
     return replace(robot, poses=setup, parameters={**errors, **robot.parameters})
 
 
@@ -169,28 +173,22 @@ def _other_target(section: Section, name: str, link: str, positions: Topic) -> M
     )
 
 
-def _placed_targets(
-    tree: RigidTree, setup: PoseSetup, errors: Mapping[str, Parameter], place: str
-) -> dict[str, Parameter]:
-    """Errors of further targets whose place is not given, which may be anywhere.
+def _must_be_links(tree: RigidTree, setup: PoseSetup, place: str) -> None:
+    """Further targets on links of the URDF.
 
     Raises:
-        RobotError: a target that is not on the tool.
+        RobotError: one that is on none.
     """
-    found: dict[str, Parameter] = {}
-    tool = tree.model.frames[tree.frame_id(setup.link)].parentJoint
     for target in setup.others:
-        where = f"{place}: poses.targets.{target.name}.link"
         if target.link not in tree.bodies:
+            where = f"{place}: poses.targets.{target.name}.link"
             raise RobotError(f"{where}: no link {target.link!r}{did_you_mean(target.link, tree.bodies)}")
-        if tree.model.frames[tree.frame_id(target.link)].parentJoint != tool:
-            raise RobotError(
-                f"{where}: {target.link} does not move as one with {setup.link}; expected a link of the tool"
-            )
-        if target.at is None:
-            names = [f"{target.name}.{part}" for part in LENGTHS]
-            found |= {name: replace(errors[name], prior_sigma=ANYWHERE) for name in names}
-    return found
+
+
+def _placed_targets(setup: PoseSetup, errors: Mapping[str, Parameter]) -> dict[str, Parameter]:
+    """Errors of further targets whose place is not given, which may be anywhere."""
+    names = [f"{target.name}.{part}" for target in setup.others if target.at is None for part in LENGTHS]
+    return {name: replace(errors[name], prior_sigma=ANYWHERE) for name in names}
 
 
 def _write_turns(section: Any, setup: PoseSetup) -> None:

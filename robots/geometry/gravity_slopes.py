@@ -57,12 +57,13 @@ def gravity_slopes(joints: Sequence[str], point: ChainPoint, g: Array) -> Gravit
         found |= {f"{joint}.{part}": H[:, axes, 5 * j + k] for k, part in enumerate(ANGLES)}
         moved = np.where(owner < j, point.masses[j], 0.0)
         for part in LENGTHS:
-            found[f"{joint}.{part}"] = moved * _along(levers, point.by_error[f"{joint}.{part}"])
+            found[f"{joint}.{part}"] = moved * _along(levers, point.steps[f"{joint}.{part}"])
         away = point.centres[:, j, None] - point.origins[:, owner]
         found[f"{joint}.{LINK_MASS}"] = np.where(owner <= j, np.sum(levers * away, axis=2), 0.0)
+    carrying = owner <= point.level  # of the target
     for part in LENGTHS:
-        found[f"{TOOL}.{part}"] = point.payload * _along(levers, point.by_error[f"{TOOL}.{part}"])
-    found[PAYLOAD] = np.sum(levers * (point.target[:, None] - point.origins[:, owner]), axis=2)
+        found[f"{TOOL}.{part}"] = point.payload * carrying * _along(levers, point.steps[f"{TOOL}.{part}"])
+    found[PAYLOAD] = carrying * np.sum(levers * (point.target[:, None] - point.origins[:, owner]), axis=2)
     return GravitySlopes(H[:, axes[:, None], axes], found)
 
 

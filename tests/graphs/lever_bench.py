@@ -82,3 +82,11 @@ def hanging(count, seed, rigid=False, creeping=0):
         "bench", "", np.zeros((count, 2)), motor, None if rigid else link, u, zero, zero, zero, forces,
         ("hook",) * count, np.ones((count, 1), dtype=bool), creep,
     )  # fmt: skip
+
+
+def lever_in_sight(folder):
+    """The rigid lever with a tracker that sees its hook."""
+    path = lever(folder, rigid=True).path
+    section = "poses: {target: hook, tracker: base, sigma: 1.0e-5, repeatability: 1.0e-5, length_sigma: 1.0e-3}\n"
+    path.write_text(path.read_text(encoding="utf-8").replace("parameters:\n", f"{section}parameters:\n"), "utf-8")
+    return load_robot(path)

@@ -15,7 +15,7 @@ from jointscope.tools.terminal.progress import Progress, progress_bar
 from jointscope.tools.verb_parts.bag_arguments import add_bag_arguments, check_kind, input_files, read_bags
 from jointscope.tools.verb_parts.result_files import ResultFiles, add_result_options, check_viewer, write_discovery
 from jointscope.tools.verb_parts.searches.arm_search import run_arm_search
-from jointscope.tools.verb_parts.searches.kinds_search import must_be_searched_apart
+from jointscope.tools.verb_parts.searches.kinds_search import run_kinds_discovery, several_graphs
 from jointscope.tools.verb_parts.searches.rest_search import run_rest_search
 from jointscope.tools.verb_parts.user_effects import load_user_effects
 from jointscope.tools.verb_parts.workers import add_workers_option, check_one_choice, check_workers, workers_of
@@ -34,9 +34,10 @@ EXAMPLE = """example:
   jointscope discover biorob --rests spring1 spring2 gravity --holdout-rests spring3 -o found.yaml
   jointscope discover tx90l --poses poses.csv --holdout-poses others.csv -o found.yaml
   jointscope discover tx90l --frequency frequency_P1 frequency_P3 --poses poses.csv -o found.yaml
+  jointscope discover arm.yaml train.mcap --poses poses.csv --rests weights -o found.yaml
 
-Every step is kept as a robot file of its own: found.step0.yaml, found.step1.yaml, ... The same command again continues
-after the last finished step; found.discovery.json remembers what it started from."""
+With motion alone every step is kept as a robot file of its own: found.step0.yaml, found.step1.yaml, ... The same
+command continues after the last finished step; found.discovery.json remembers what it started from."""
 
 MOST_STEPS = 12  # of robots with free links, whose sensors show one effect for each joint and gyro
 
@@ -57,7 +58,6 @@ def run(args: argparse.Namespace) -> int:
     files = ResultFiles.of(args)
     check_one_choice(args)
     check_kind(args)
-    must_be_searched_apart(args)
     beside = [state_file(args.output), *(step_file(args.output, k) for k in range(MOST_STEPS + 1))]
     check_outputs([*files.all, *beside], inputs=input_files(args))
     load_user_effects(args.effects)
@@ -65,6 +65,11 @@ def run(args: argparse.Namespace) -> int:
     from jointscope.tools.terminal.discovery_text import discovery_text
 
     robot = load_robot(args.robot)
+    if several_graphs(args):
+        with progress_bar() as progress, workers_of(args) as workers:
+            print(run_kinds_discovery(robot, args, files, workers, progress))
+        files.tell()
+        return 0
     if args.poses or args.frequency:
         given, held = (args.poses, args.frequency), (args.holdout_poses, args.holdout_frequency)
         with progress_bar() as progress:

@@ -289,7 +289,7 @@ def test_several_targets_with_orientations_from_the_first_command_to_the_last(tm
     [
         ("joint1: {}", "", "'joint1' is the name of the first target, of a joint, tool, tracker or has a dot"),
         ("left: {link: link9}", "", "poses.targets.left.link: no link 'link9'"),
-        ("left: {link: base_link}", "", "base_link does not move as one with reflector; expected a link of the tool"),
+        ("left: {link: base_link}", "", "base_link does not move with the arm; expected a link that joint1"),
         ("left: {att: [0, 0, 0]}", "", "unknown key 'att'"),
         ("left: {at: [0, 0]}", "", "at: expected 3 finite numbers"),
         (

@@ -115,7 +115,7 @@ class ArmBodies:
             ".y" and ".x" of the bearing.
         """
         robot, tree, welded = self._robot, self._robot.tree, angles or {}
-        parent, found = spec.worldbody, {}
+        parent, found, bodies = spec.worldbody, {}, dict[int, Any]()
         for j in range(1, tree.model.njoints):
             name, inertia = tree.model.names[j], tree.model.inertias[j]
             place, (axis, _) = tree.model.jointPlacements[j], joint_axis(tree.model, j)
@@ -133,20 +133,21 @@ class ArmBodies:
                 ipos=inertia.lever,
                 fullinertia=full_inertia(inertia.inertia + 1e-9 * np.eye(3)),
             )
+            bodies[j] = parent
             if name not in welded or name in giving:
                 found[name] = parent, {"": axis, ".y": y, ".x": x}
         if robot.poses is not None:
-            self._add_targets(parent)
+            self._add_targets(bodies)
         return found
 
-    def _add_targets(self, body: Any) -> None:
-        """A site for each target, and the payload at the first one."""
+    def _add_targets(self, bodies: Mapping[int, Any]) -> None:
+        """A site for each target on the body behind its joint, by number of the joint; the payload at the first one."""
         setup, tree = self._robot.poses, self._robot.tree
         assert setup is not None
         places = []
         for i, target in enumerate(setup.targets):
-            owner = target.name if i else "tool"
-            placement = tree.model.frames[tree.frame_id(target.link)].placement
+            owner, frame = target.name if i else "tool", tree.model.frames[tree.frame_id(target.link)]
+            placement, body = frame.placement, bodies[int(frame.parentJoint)]
             error = np.array([self.value(owner, part) for part in ("lx", "ly", "lz")])
             places.append(placement.act((np.zeros(3) if target.at is None else target.at) + error))
             turn = placement.rotation @ self._orientations.get(
@@ -157,7 +158,8 @@ class ArmBodies:
             body.add_site(name=f"target {target.name}", pos=places[-1], quat=quaternion_wxyz(turn))
         at, mass = places[0], self.size("payload", "robot", "mass")
         if mass > 0.0:
-            body.add_body(
+            first = tree.model.frames[tree.frame_id(setup.link)].parentJoint
+            bodies[int(first)].add_body(
                 name="payload",
                 pos=at,
                 ipos=np.zeros(3),

@@ -1,20 +1,26 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""`diagnose` with several kinds of recordings: one ranking of all effects, and what each kind says of each."""
+"""`diagnose` and `discover` with several kinds of recordings: what each kind says of each effect, and one model."""
 
 from __future__ import annotations
 
 import argparse
+from collections.abc import Mapping, Sequence
+from functools import partial
+from pathlib import Path
 from typing import Any
 
+from jointscope.graphs.across_kinds.kinds_recordings import KindsRecordings
 from jointscope.robots.errors import RecordingError, RobotError
+from jointscope.robots.geometry.arm_effects import FREQUENCY
 from jointscope.robots.model.robot import Robot
 from jointscope.tools.terminal.progress import Progress
 from jointscope.tools.verb_parts.bag_arguments import read_bags
 from jointscope.tools.verb_parts.frequency_runs import read_all_shaken
 from jointscope.tools.verb_parts.rest_runs import read_all_rests
-from jointscope.tools.verb_parts.result_files import ResultFiles, write_diagnosis
+from jointscope.tools.verb_parts.result_files import ResultFiles, write_diagnosis, write_still
 from jointscope.tools.verb_parts.searches import arm_search, rest_search
 from jointscope.tools.verb_parts.workers import check_workers
+from jointscope.tools.writing.origin import made_from, origin, other_kinds
 from jointscope.tools.writing.whole_file import write_json
 
 
@@ -70,18 +76,55 @@ def run_kinds_diagnosis(
     return kinds_text(found)
 
 
-def must_be_searched_apart(args: argparse.Namespace) -> None:
-    """`discover` adds what one graph says.
+def run_kinds_discovery(
+    robot: Robot, args: argparse.Namespace, files: ResultFiles, workers: Any, progress: Progress
+) -> str:
+    """Grows one model by all kinds, writes the files, and returns what the screen says; arguments as above.
 
     Raises:
-        RecordingError: kinds that have graphs of their own.
+        RobotError: a viewer recording was asked for.
+        JointscopeError: the recordings cannot be used, or a file cannot be written; then none is.
     """
-    if several_graphs(args):
-        raise RecordingError(
-            "`discover` grows a model by motion, by rests, or by --poses and --frequency; `jointscope diagnose` takes "
-            "all of them and says which kind shows what is missing: discover with that kind, and give the robot file "
-            "that it writes to `jointscope calibrate` with all of them"
-        )
+    from jointscope.graphs.across_kinds.discover_kinds import discover_kinds
+    from jointscope.tools.report.searches.kinds_search_report import kinds_search_report
+    from jointscope.tools.terminal.searches.kinds_discovery_text import kinds_discovery_text
+
+    if files.rrd is not None:
+        raise RobotError(f"{robot.name}: --rrd shows motion alone; leave it out where several kinds are searched")
+    if args.restart:
+        raise RecordingError("--restart: a search over several kinds keeps no steps on disk; leave it out")
+    given, held = _read(robot, args, workers, progress)
+    found = discover_kinds(robot, given, held, progress, missing_torque=False, side_by_side=workers)
+    made = origin(robot.path.name, given.motion) if given.motion else made_from(robot.path.name)
+    made |= other_kinds(found.steps[-1].model.result) | _shaken_origin(given)
+    write_still(files, found.robot, made, partial(kinds_search_report, found), discovery_json(found, files.robot))
+    return kinds_discovery_text(found)
+
+
+def _read(
+    robot: Robot, args: argparse.Namespace, workers: Any, progress: Progress
+) -> tuple[KindsRecordings, KindsRecordings]:
+    """What the arguments name, for training and held out."""
+    from jointscope.tools.bags.at_poses.read_poses import read_poses
+
+    motion, holdout = read_bags(args, robot, progress) if args.bags else ([], None)
+    check_workers(workers, robot, motion)
+
+    def still(poses: Sequence[Path], shaken: Sequence[Path], rests: Sequence[Path]) -> dict[str, Any]:
+        return {
+            "poses": tuple(read_poses(path, robot) for path in poses),
+            "shaken": tuple(read_all_shaken(robot, shaken, progress)),
+            "rests": tuple(read_all_rests(rests, robot, progress)),
+        }
+
+    given = KindsRecordings(tuple(motion), **still(args.poses, args.frequency, args.rests))
+    others = still(args.holdout_poses, args.holdout_frequency, args.holdout_rests)
+    return given, KindsRecordings(() if holdout is None else (holdout,), **others)
+
+
+def _shaken_origin(given: KindsRecordings) -> dict[str, Any]:
+    each = [{"path": signals.path, "sha256": signals.sha256} for signals, _ in given.shaken]
+    return {"frequency": each} if each else {}
 
 
 def kinds_json(found: Any) -> dict[str, Any]:
@@ -97,6 +140,45 @@ def kinds_json(found: Any) -> dict[str, Any]:
     if found.rests is not None:
         by_graph["rests"] = rest_search.diagnosis_json(found.rests)
     return {"adequate": found.adequate, "candidates": [_effect(c) for c in found.candidates], "by_graph": by_graph}
+
+
+def discovery_json(found: Any, robot_file: Path | None) -> dict[str, Any]:
+    """All steps for machines: errors of each in sigmas of the last model's noise, torques left as parts of its own."""
+    train, heldout = ([each[i] for each in found.errors] for i in (0, 1))
+    steps = []
+    for k, step in enumerate(found.steps):
+        own, held = (_over_last(each, k) for each in (train, heldout))
+        c = step.added
+        steps.append(
+            {
+                "added": None if c is None else c.label,
+                "removed": step.removed or None,
+                "train_error": _rms(own),
+                "heldout_error": _rms(held) if held else None,
+                "floor": 1.0,
+                "by_kind": {**own, **held},
+                "train_by_kind": own,
+                "heldout_by_kind": held,
+                "effect": None if c is None else _effect(c),
+                "candidates": [_effect(each) for each in step.found.candidates],
+            }
+        )
+    return {
+        "steps": steps,
+        "stop_reason": found.stop_reason,
+        "adequate": found.adequate,
+        "robot_file": None if robot_file is None else str(robot_file),
+    }
+
+
+def _over_last(errors: Sequence[Mapping[str, float]], k: int) -> dict[str, float]:
+    """Of a step by kind; torques that responses leave have no sigma of their own, and that of the last model counts."""
+    last = errors[-1].get(FREQUENCY, 1.0)
+    return {kind: error / last if kind == FREQUENCY else error for kind, error in errors[k].items()}
+
+
+def _rms(by_kind: Mapping[str, float]) -> float:
+    return float(sum(error**2 for error in by_kind.values()) / len(by_kind)) ** 0.5
 
 
 def _effect(c: Any) -> dict[str, Any]:
