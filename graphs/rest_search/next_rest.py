@@ -31,7 +31,7 @@ from jointscope.robots.parts.relative_sigma import KNOWN
 Array = NDArray[np.float64]
 
 LOOSE = 0.05  # share of a value that its sigma must be to be looked at
-ASKED, TOLD = 6, 3  # values that are tried, the least known first, and that are told
+ASKED, TOLD = 15, 3  # values that are tried, the least known first, and that are told
 HELPS = 0.85  # times its sigma that a value must have after ten such rests
 AS_GOOD = 1.25  # times the sigma that a posture nearer to the usual one may leave
 REPEATS = 10
