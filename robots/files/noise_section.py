@@ -15,8 +15,26 @@ from jointscope.robots.yaml_section import Section
 Array = NDArray[np.float64]
 
 SMALLEST_TURNING, SMALLEST_SLIDING = 1e-3, 1e-5  # [rad/s/sqrt(s)], [m/s/sqrt(s)]
+LOOSE = (0.35, 0.26)  # of links and motors: any motion can be approached with them
 HINGE_DENSITY = 0.1  # [rad/s/sqrt(s)] of a soft bearing's hinges before a calibration
 HINGE_LASTING = 0.1  # [rad/s^2] standard deviation of what lasts there
+
+
+def noise_of(top: Section, joints: tuple[str, ...], needed: bool) -> Section:
+    """The section of a robot file; an empty one where the robot needs none.
+
+    Raises:
+        RobotError: it needs one, and there is none; the message says what to write.
+    """
+    if not needed:
+        return top.section("noise", {})
+    if "noise" not in top:
+        link, motor = ([density] * len(joints) for density in LOOSE)
+        raise RobotError(
+            f"{top.place}: 'noise' is missing; write `noise: {{estimate: true, link_velocity: {link}, motor_velocity: "
+            f"{motor}}}` (densities of random torques with which recordings of motion begin; rests do not use them)"
+        )
+    return top.section("noise")
 
 
 def process_noise(section: Section, robot: Robot) -> ProcessNoise:

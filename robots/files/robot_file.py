@@ -21,7 +21,7 @@ from jointscope.robots.files.derived_section import derived_results
 from jointscope.robots.files.effect_catalogue import parse_effect
 from jointscope.robots.files.frequency_section import check_still_parameters, frequency_setup
 from jointscope.robots.files.locked_section import check_locked_springs
-from jointscope.robots.files.noise_section import process_noise
+from jointscope.robots.files.noise_section import noise_of, process_noise
 from jointscope.robots.files.pose_section import pose_setup, with_poses
 from jointscope.robots.files.robot_consistency import check_robot
 from jointscope.robots.files.sensor_sections import sensor, topic
@@ -88,7 +88,7 @@ def load_robot(name_or_path: str | Path) -> Robot:
     matrix = (
         top.section("transmission").build(lambda s: transmission_matrix(s, joints)) if "transmission" in top else None
     )
-    noise_section = top.section("noise", *_none(motion and choices.link_dynamics != "free"))
+    noise = noise_of(top, joints, motion and choices.link_dynamics != "free")
     robot = Robot(
         name=top.text("name"),
         description=top.text("description", ""),
@@ -113,7 +113,7 @@ def load_robot(name_or_path: str | Path) -> Robot:
     robot = with_effects(replace(robot, held_at_mean=_held_at_mean(top, locked)), top.texts("effects", ()))
     robot = replace(robot, derived=top.section("derived", {}).build(lambda s: derived_results(s, robot)))
     if motion:
-        robot = replace(robot, noise=noise_section.build(lambda s: process_noise(s, robot)))
+        robot = replace(robot, noise=noise.build(lambda s: process_noise(s, robot)))
     top.raw("calibration")
     check_locked_springs(top, robot)
     check_robot(robot) if motion else check_still_parameters(robot, parameters)

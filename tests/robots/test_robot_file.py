@@ -121,6 +121,16 @@ def test_every_mistake_in_a_robot_file_is_named_with_its_place(right, wrong, tol
     assert complaint(tmp_path / "my.yaml").replace(str(tmp_path), "FOLDER").replace(ready, "READY") == told
 
 
+def test_a_file_for_rests_is_told_what_noise_to_write(tmp_path):
+    text = doggy_text().partition("\nnoise:")[0]  # the last section
+    (tmp_path / "my.yaml").write_text(f"{text}\n")
+    said = complaint(tmp_path / "my.yaml")
+    assert said.startswith("my.yaml: 'noise' is missing; write `noise: {estimate: true, link_velocity: [0.35, 0.35, ")
+    section = said.partition("`")[2].partition("`")[0]
+    (tmp_path / "my.yaml").write_text(f"{text}\n{section}\n")
+    assert load_robot(tmp_path / "my.yaml").noise.estimate
+
+
 @pytest.mark.parametrize(
     ("content", "told"),
     [

@@ -9,6 +9,7 @@ from html import escape
 
 from jointscope.graphs.joint_kinds.calibrate_kinds import KindsCalibration
 from jointscope.graphs.joint_kinds.calibrate_with_rests import WithRests
+from jointscope.graphs.rest_search.next_rest import NextRest
 from jointscope.tools.acceptance.evaluation import NO_LIMITS, AcceptedBy
 from jointscope.tools.presentation.frequency_sentences import (
     identifiable_sentence,
@@ -51,13 +52,19 @@ def kinds_report(result: KindsCalibration, checked: AcceptedBy = NO_LIMITS, more
     return page(f"{result.robot.name}: poses and frequency responses", ", ".join(paths), sections)
 
 
-def with_rests_report(result: WithRests, checked: AcceptedBy = NO_LIMITS, more: Sequence[Section] = ()) -> str:
+def with_rests_report(
+    result: WithRests,
+    checked: AcceptedBy = NO_LIMITS,
+    more: Sequence[Section] = (),
+    advice: Sequence[NextRest] = (),
+) -> str:
     """The whole page as text, without references to anything outside of itself.
 
     Args:
         result: the calibration.
         checked: limits that the user has declared, as they came out.
         more: sections at the end.
+        advice: rests to add.
     """
     judgement, parts, paths = judge_with_rests(result), list[tuple[str, list[Section]]](), list[str]()
     if result.poses is not None:
@@ -66,7 +73,7 @@ def with_rests_report(result: WithRests, checked: AcceptedBy = NO_LIMITS, more: 
     if result.frequency is not None:
         parts.append(("Frequency responses", frequency_sections(result.frequency)))
         paths += [problem.pose.path for problem in result.frequency.problems]
-    parts.append(("Rests", rest_sections(result.rests)))
+    parts.append(("Rests", rest_sections(result.rests, advice)))
     paths += [problem.rests.path for problem in result.rests.problems]
     items = "".join(f"<li><b>{escape(check.name)}</b>: {escape(check.text)}</li>" for check in judgement.checks)
     sections = [Section("kinds", "Is it good?", f"<ul>{items}</ul>", judgement.headline), *acceptance(checked)]

@@ -3,25 +3,28 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 from jointscope.graphs.calibration.calibration_result import CalibrationResult, ParameterEstimate
+from jointscope.graphs.rest_search.next_rest import NextRest
 from jointscope.graphs.rests.calibrate_rests import RestCalibration
 from jointscope.graphs.rests.rest_errors import RestErrors, rest_errors
 from jointscope.graphs.rests.rest_set import RestSet
 from jointscope.robots.model.robot import Robot
 from jointscope.tools.bags.clocks.durations import counted
+from jointscope.tools.presentation.next_rest_text import next_rest_sentence
 from jointscope.tools.presentation.numbers import significant, with_sigma
 from jointscope.tools.terminal.text_table import text_table
 from jointscope.tools.verdicts.rests.rest_verdict import verdict
 
 
-def rest_calibration_text(result: RestCalibration, beside: bool = False) -> str:
+def rest_calibration_text(result: RestCalibration, beside: bool = False, advice: Sequence[NextRest] = ()) -> str:
     """The summary of a calibration.
 
     Args:
         result: the calibration.
         beside: whether it is a part of one from several kinds, which has a verdict on all.
+        advice: rests to add.
     """
     paths = ", ".join(problem.rests.path for problem in result.problems)
     lines = [
@@ -39,7 +42,15 @@ def rest_calibration_text(result: RestCalibration, beside: bool = False) -> str:
         "<>>><<",
     )
     silent = f"\n\nThe rests say nothing about {', '.join(result.silent)}." if result.silent else ""
+    silent += "".join(f"\n{line}" for line in _advised(result, advice))
     return "\n".join(lines) + f"\n\n{table}{silent}\n\n{_errors({result.robot.name: result.errors}, result.robot)}"
+
+
+def _advised(result: RestCalibration, advice: Sequence[NextRest]) -> list[str]:
+    if not advice:
+        return []
+    said = [f"  {next_rest_sentence(rest, result.robot)}" for rest in advice]
+    return ["", "Rests that would tell most of what is hardly known, if the model holds there, too:", *said]
 
 
 def rest_errors_text(by_label: Mapping[str, RestErrors], robots: Mapping[str, Robot], count: int) -> str:

@@ -6,6 +6,7 @@ from __future__ import annotations
 import argparse
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -65,6 +66,7 @@ def run_rest_calibration(
         RobotError: a viewer recording was asked for.
         JointscopeError: the rests cannot be used, or a file cannot be written; then none is.
     """
+    from jointscope.graphs.rest_search.next_rest import next_rests
     from jointscope.graphs.rests.calibrate_rests import calibrate_rests
     from jointscope.tools.report.rests_report import rests_report
     from jointscope.tools.terminal.rests_text import rest_calibration_text
@@ -75,9 +77,11 @@ def run_rest_calibration(
     made = made_from(robot.path.name) | other_kinds(result)
     if coupling is not None:
         made |= _locked_origin(coupling)
-    content = result.to_json() | coupling_json(coupling)
-    checked = write_found(files, robot.name, result, rests_report, made, content, limits)
-    return "\n\n".join([*coupling_lines(coupling), rest_calibration_text(result)]), checked
+    advice = next_rests(result)
+    content = result.to_json() | coupling_json(coupling) | {"next_rests": [rest.to_json() for rest in advice]}
+    page = partial(rests_report, advice=advice)
+    checked = write_found(files, robot.name, result, page, made, content, limits)
+    return "\n\n".join([*coupling_lines(coupling), rest_calibration_text(result, advice=advice)]), checked
 
 
 def coupling_of(paths: Sequence[Path], robot: Robot) -> Coupling | None:
@@ -153,6 +157,7 @@ def run_calibration_with_rests(
         JointscopeError: recordings cannot be used, or a file cannot be written; then none is.
     """
     from jointscope.graphs.joint_kinds.calibrate_with_rests import calibrate_with_rests
+    from jointscope.graphs.rest_search.next_rest import next_rests
     from jointscope.tools.bags.at_poses.read_poses import read_poses
     from jointscope.tools.report.kinds_report import with_rests_report
     from jointscope.tools.terminal.poses_text import pose_calibration_text
@@ -170,9 +175,12 @@ def run_calibration_with_rests(
     if result.frequency is not None:
         made |= frequency_origin(result.frequency, robot)
         texts.append(frequency_calibration_text(result.frequency, beside=True))
+    advice = next_rests(result.rests)
     content, others = _with_rests_json(result), urdf_files(result.robot, urdf)
-    checked = write_found(files, robot.name, result, with_rests_report, made, content, limits, others)
-    return "\n\n".join([_said(result), *texts, rest_calibration_text(result.rests, beside=True)]), checked
+    content |= {"next_rests": [rest.to_json() for rest in advice]}
+    page = partial(with_rests_report, advice=advice)
+    checked = write_found(files, robot.name, result, page, made, content, limits, others)
+    return "\n\n".join([_said(result), *texts, rest_calibration_text(result.rests, True, advice)]), checked
 
 
 def _said(result: Any) -> str:

@@ -40,7 +40,6 @@ def run(args: argparse.Namespace) -> int:
     """Describes the bag; a bag that the robot cannot use is an answer, not a failure."""
     check_outputs([args.json], inputs=[args.bag, *args.effects])
     from jointscope.robots.errors import RecordingError
-    from jointscope.robots.files.locked_section import names_recording
     from jointscope.tools.bags.describe_bag import describe_bag
     from jointscope.tools.bags.messages.open_bag import BAG_SUFFIXES
 
@@ -51,15 +50,17 @@ def run(args: argparse.Namespace) -> int:
             f"jointscope info {other} --robot {args.bag}"
         )
     load_user_effects(args.effects)
-    robot = None
+    robot, locked = None, False
     if args.robot:
+        from jointscope.robots.files.locked_section import names_recording
         from jointscope.robots.files.robot_file import load_robot  # the equations of motion behind it cost time
 
         robot = load_robot(args.robot)
+        locked = args.locked_springs or names_recording(robot, args.bag)
     if args.locked_springs and robot is None:
         raise RecordingError("--locked-springs compares motors and links; give --robot, too: it names their topics")
     with progress_bar() as progress:
-        if robot is not None and (args.locked_springs or names_recording(robot, args.bag)):
+        if robot is not None and locked:
             content, text = _locked(args.bag, robot)
         else:
             description = describe_bag(args.bag, robot, reading(args.bag, progress))

@@ -11,12 +11,14 @@ import pytest
 from locked_bench import BIOROB, BIOROB_T, DOGGY, DOGGY_T, LATE, locked_bench, with_matrix
 
 from jointscope.factors.calibration import DYNAMICS, Calibration
+from jointscope.graphs.calibration.calibrate import calibrate
 from jointscope.graphs.locked_springs.coupling import find_coupling
 from jointscope.graphs.locked_springs.locked_readings import LockedReadings
 from jointscope.graphs.locked_springs.locked_set import ZEROS, LockedSet
 from jointscope.robots.dynamics.transmission import Transmission
 from jointscope.robots.errors import RecordingError
 from jointscope.robots.files.effect_editing import add_effect
+from jointscope.tools.simulator.simulation import simulate
 
 ROBOTS = {"biorob": (BIOROB, BIOROB_T), "doggy": (DOGGY, DOGGY_T)}
 
@@ -205,3 +207,20 @@ def test_hardly_any_motion_and_no_encoders_on_the_links_are_refused():
     blind = replace(BIOROB, sensors={"motor_encoder": BIOROB.motor_encoder})
     with pytest.raises(RecordingError, match="no sensor of kind link_encoder; add one, or leave the recording out"):
         LockedReadings.of(bench, blind, BIOROB.joints)
+
+
+@pytest.mark.slow
+def test_motion_and_locked_springs_share_the_elements_in_one_graph():
+    pytest.importorskip("mujoco", reason="the simulator needs the extra jointscope[sim]")
+    motion = simulate(BIOROB, "calibration", 4.0, seed=3, friction="smooth").recording
+    coupling = find_coupling(replace(BIOROB, transmission=None), [readings(BIOROB)])
+    model = coupling.of_robot()
+    alone, both = calibrate(model, [motion]), calibrate(model, [motion], sets=coupling.sets(model))
+    for (i, j), value in BIOROB_T.items():
+        name = coupling.element(i, j)
+        without, found = (next(p for p in result.parameters if p.name == name) for result in (alone, both))
+        widened = both.sigma_inflation.get(name, 1.0), alone.sigma_inflation.get(name, 1.0)
+        assert found.value == pytest.approx(value, abs=3.5 * found.sigma)
+        # never worse than the better of the two by itself
+        assert found.sigma / widened[0] < 1.05 * min(without.sigma / widened[1], coupling.sigmas[i, j])
+    assert both.samples == alone.samples + 4 * len(coupling.fits[0].readings[0])

@@ -3,6 +3,8 @@
 
 from __future__ import annotations
 
+import re
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -10,6 +12,7 @@ import pytest
 
 from jointscope.robots.errors import RecordingError
 from jointscope.robots.files.robot_file import load_robot
+from jointscope.robots.rests.angle_units import check_angle_units
 from jointscope.tools.bags.at_poses.load_table import check_loads
 from jointscope.tools.bags.at_poses.read_rests import read_rests
 from jointscope.tools.bags.read_recording import read_recording
@@ -119,3 +122,45 @@ def test_a_table_beside_a_bag_with_loads_is_one_too_many(tmp_path):
     (tmp_path / "spring1.loads.csv").write_text("time,link,mass\n0,attachment,1\n")
     with pytest.raises(RecordingError, match=r"has the topic /load, and .*spring1\.loads\.csv says loads, too"):
         read_rests(bag, ROBOT)
+
+
+@pytest.fixture(scope="module")
+def in_degrees(tmp_path_factory):
+    """Bags of the same rests with encoders in degrees: of both sides, of the links, of the motors."""
+    folder = tmp_path_factory.mktemp("degrees")
+    recording = read_recording(DATA / "static_gravity" / "gravity", ROBOT).between(0.0, 60.0)
+    for name, sides in {
+        "both": ("motor_encoder", "link_encoder"),
+        "links": ("link_encoder",),
+        "motors": ("motor_encoder",),
+    }.items():
+        turned = {side: replace(s, values=np.degrees(s.values)) for side in sides for s in [recording.streams[side]]}
+        write_bag(folder / f"{name}.mcap", replace(recording, streams={**recording.streams, **turned}), ROBOT)
+    return folder
+
+
+@needs_biorob
+@pytest.mark.parametrize(("name", "side"), [("both", "link"), ("links", "link"), ("motors", "motor")])
+def test_angles_in_degrees_are_named_before_any_equilibrium_is_looked_for(in_degrees, name, side):
+    with pytest.raises(RecordingError) as err:
+        read_rests(in_degrees / f"{name}.mcap", ROBOT)
+    said = str(err.value)
+    assert "_position spans 1" in said and " rad; biorob.urdf allows " in said
+    assert said.endswith(f"look like degrees: set `unit` of sensors.{side}_encoder in the robot file (now rad) to deg")
+
+
+@needs_biorob
+def test_without_limits_motors_and_links_tell_of_each_other(in_degrees, tmp_path):
+    urdf = re.sub(r'type="revolute"', 'type="continuous"', ROBOT.tree.urdf.read_text(encoding="utf-8"))
+    urdf = re.sub(r'lower="\S+" upper="\S+" ', "", urdf)
+    (tmp_path / "free.urdf").write_text(urdf, encoding="utf-8")
+    text = ROBOT.path.read_text(encoding="utf-8").replace("urdf: biorob.urdf", "urdf: free.urdf")
+    (tmp_path / "free.yaml").write_text(text, encoding="utf-8")
+    free = load_robot(tmp_path / "free.yaml")
+    recording = read_recording(in_degrees / "motors.mcap", ROBOT)
+    short = {name: replace(s, values=0.05 * s.values) for name, s in recording.streams.items()}  # within all turns
+    with pytest.raises(
+        RecordingError, match=r"motor_position moves 6\S+ times as far as joint\d.link_position, both as"
+    ):
+        check_angle_units(replace(recording, streams=short), free)
+    check_angle_units(read_recording(DATA / "static_gravity" / "gravity", ROBOT), free)

@@ -50,6 +50,7 @@ SHELL_ONLY_OF = {
         "output": "`save=` is called after each step",
         **dict.fromkeys(("poses", "rests", "frequency"), OTHER_KIND),
     },
+    "info": {"locked_springs": "`tools.bags.read_locked.read_coupling([bag], robot)` gives the matrix as an object"},
     "replay": {"output": RESULT, **dict.fromkeys(("batch", "live", "speed"), NO_TERMINAL)},
     "simulate": {
         **dict.fromkeys(("kind", "count", "session", "orientation", "pose", "realisations", "highest"), OTHER_KIND),

@@ -164,7 +164,7 @@ def test_the_page_says_what_its_commands_print(tmp_path, monkeypatch, capsys):
         assert main(shlex.split(command)[1:]) == 0
     assert Path("arm_coupled.yaml").is_file()
     printed = page.partition("```\nLocked springs in")[2].partition("write `transmission")[0]
-    assert len(printed.splitlines()) == 8 and printed in capsys.readouterr().out
+    assert len(printed.splitlines()) == 9 and printed in capsys.readouterr().out
 
 
 @pytest.mark.slow

@@ -14,6 +14,7 @@ import numpy as np
 from jointscope.robots.errors import RecordingError
 from jointscope.robots.model.robot import Robot
 from jointscope.robots.recordings.recording import Notice, Recording
+from jointscope.robots.rests.angle_units import check_angle_units
 from jointscope.robots.rests.load_history import LoadHistory
 from jointscope.robots.rests.rests import Rests, find_rests
 from jointscope.tools.bags.at_poses.load_table import check_loads, loads_beside, loads_from_table
@@ -32,10 +33,12 @@ def read_rests(path: str | Path, robot: Robot) -> Rests:
         robot: says which topics, fields, units and joint names.
 
     Raises:
-        RecordingError: the bag cannot be read, has no rests, or loads that cannot hang on this robot.
+        RecordingError: the bag cannot be read, has no rests, positions in another unit than the robot file says, or
+            loads that cannot hang on this robot.
     """
     robot.need_link_dynamics()
     recording = read_recording(path, robot)
+    check_angle_units(recording, robot)
     table = loads_beside(Path(path))
     found = _loads(Path(path), robot, recording)
     if not table.is_file():
