@@ -27,6 +27,7 @@ from jointscope.graphs.rests.unnoticed import Unnoticed, unnoticed
 from jointscope.graphs.solving.batch_solver import Progress, Solution, solve
 from jointscope.graphs.solving.estimate import Estimate
 from jointscope.graphs.solving.solver_context import in_solver_context
+from jointscope.graphs.starts.spring_knots import with_knots
 from jointscope.robots.errors import SolveError
 from jointscope.robots.model.robot import Robot
 from jointscope.robots.parts.parameter import with_sigmas
@@ -132,6 +133,7 @@ def calibrate_rests(
         SolveError: no convergence.
     """
     began, report = time.perf_counter(), progress or (lambda text, share: None)
+    robot = with_knots(robot, recordings)
     problems, solution, iterations = settled_rests(robot, recordings, report, near)
     (x,), (likeliest,) = solution.estimate.states, solution.estimate.calibrations
     whole = RestSet.joined(problems)
