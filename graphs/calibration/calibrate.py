@@ -57,6 +57,7 @@ from jointscope.graphs.solving.solver_context import give_back_memory, in_solver
 from jointscope.graphs.starts.drive_signal import told_drive_signal
 from jointscope.graphs.starts.initial_guess import initial_biases, initial_dynamics, initial_states
 from jointscope.graphs.starts.second_opinion import on_their_word, regressed_values
+from jointscope.graphs.starts.spring_knots import with_knots
 from jointscope.graphs.starts.time_shift_start import with_best_shifts
 from jointscope.robots.errors import RecordingError
 from jointscope.robots.model.robot import Robot
@@ -113,6 +114,7 @@ def calibrate(
     """
     started = time.perf_counter()
     report = progress or (lambda text, share: None)
+    robot = with_knots(robot, recordings)
     result = _calibrated(robot, recordings, biases_only, near, standstill, solver, sets, memory, report)
     turned = turned_without_reason(robot, result) if near is None and not biases_only else {}
     if turned:

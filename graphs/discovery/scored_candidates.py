@@ -16,12 +16,13 @@ from jointscope.graphs.calibration.base_model import BaseModel
 from jointscope.graphs.noise.noise_estimation import scaled
 from jointscope.graphs.problem.bag_problem import BagProblem
 from jointscope.graphs.scoring.columns.gap import gap_hypotheses
-from jointscope.graphs.scoring.columns.hypotheses import EffectHypothesis, deflections_of, hypotheses_of
+from jointscope.graphs.scoring.columns.hypotheses import EffectHypothesis, hypotheses_of
 from jointscope.graphs.scoring.columns.score_signals import ScoreSignals
 from jointscope.graphs.scoring.hypothesis_score import HypothesisScore, JointScores, best_shapes
 from jointscope.graphs.scoring.order_scan import scan_orders
 from jointscope.graphs.scoring.score_system import Segment
 from jointscope.graphs.scoring.score_test import ScoreTest
+from jointscope.graphs.starts.spring_knots import deflections_of
 
 Array = NDArray[np.float64]
 

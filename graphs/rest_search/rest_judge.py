@@ -19,6 +19,7 @@ from jointscope.graphs.rest_search.rest_hypotheses import tried_and_silent
 from jointscope.graphs.rest_search.rest_race import ALIKE, Race, Tried, race, significant
 from jointscope.graphs.rest_search.rest_scores import RestScore, RestScores, score_rests
 from jointscope.robots.effect_kinds.effect import EffectParameter
+from jointscope.robots.effect_kinds.joint_torque import JointTorque
 
 Array = NDArray[np.float64]
 MOST = 0.6  # share of the groups that must be likelier
@@ -197,9 +198,21 @@ class _Judge:
 
 
 def _simplest(equal: Sequence[Tried]) -> Tried | None:
-    """Of effects that are worth as much on what was left out the one with the fewest sizes, if evidence allows it."""
-    most = max((each.evidence for each in equal), default=0.0)
-    return min((each for each in equal if each.evidence > most - DECISIVE), key=lambda t: t.score.dof, default=None)
+    """Of effects that are worth as much on what was left out the one with the fewest sizes.
+
+    Among laws of one spring, a polynomial and a curve of pieces, evidence may say that it is too simple.
+    """
+    simplest = min(equal, key=lambda each: each.score.dof, default=None)
+    if simplest is None or not _bends_spring(simplest):
+        return simplest
+    laws = [each for each in equal if each.owner == simplest.owner and _bends_spring(each)]
+    best = max(laws, key=lambda each: each.evidence)
+    return best if best.evidence > simplest.evidence + DECISIVE else simplest
+
+
+def _bends_spring(tried: Tried) -> bool:
+    effect = tried.score.score.hypothesis.here.effect
+    return isinstance(effect, JointTorque) and effect.side == "spring"
 
 
 def _possible(tried: Tried) -> bool:

@@ -56,6 +56,11 @@ class Tried:
         return self.score.label
 
     @property
+    def owner(self) -> str:
+        """Where it acts."""
+        return self.score.score.hypothesis.here.owner
+
+    @property
     def evidence(self) -> float:
         """Logarithm of the marginal likelihood, but for what is the same with every effect (Laplace's method)."""
         return self.log_share - self.fit.cost

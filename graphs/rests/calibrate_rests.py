@@ -30,6 +30,7 @@ from jointscope.graphs.solving.estimate import Estimate
 from jointscope.graphs.solving.posterior import posteriors
 from jointscope.graphs.solving.set_problem import SetProblem
 from jointscope.graphs.solving.solver_context import in_solver_context
+from jointscope.graphs.starts.spring_knots import with_knots
 from jointscope.robots.errors import SolveError
 from jointscope.robots.model.robot import Robot
 from jointscope.robots.parts.parameter import with_sigmas
@@ -140,6 +141,7 @@ def calibrate_rests(
         SolveError: no convergence.
     """
     began, report = time.perf_counter(), progress or (lambda text, share: None)
+    robot = with_knots(robot, recordings)
     problems, solution, iterations = settled_rests(robot, recordings, report, near, beside)
     x, likeliest = solution.estimate.states[0], solution.estimate.calibrations[0]
     whole = RestSet.joined(problems)

@@ -54,6 +54,8 @@ def add_effect(robot: Robot, label: str, start: dict[str, float] | None = None) 
     document.setdefault("parameters", CommentedMap())
     for p in effect.parameters_at(robot, owner):
         parameter = parameter_of(here, p, (start or {}).get(p.name, p.start))
+        # knots that nobody chose are placed where the recordings of a calibration deflect the spring
+        parameter = replace(parameter, fixed=p.held and p.name in (start or {}))
         parameters[parameter.name] = parameter
         document["parameters"][parameter.name] = _entry(parameter)
     new = replace(robot, parameters=parameters, effects=(*robot.effects, here), document=document)

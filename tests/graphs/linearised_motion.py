@@ -177,7 +177,7 @@ def dof(hypothesis):
 def one_hypothesis_each(name, kinds=None):
     """One hypothesis per effect and owner, in the middle of the grid of its shapes; of Stribeck curves the widest."""
     found = {}
-    small = dict.fromkeys(ROBOTS[name].joints, {"forward": 4e-3, "backward": 4e-3})  # well within this motion
+    small = {joint: {"forward": 4e-3, "backward": 4e-3} for joint in ROBOTS[name].joints}  # well within this motion
     for hypothesis in hypotheses_of(ROBOTS[name], deflections=small):
         if kinds is None or hypothesis.here.effect.id in kinds:
             found.setdefault(hypothesis.label, []).append(hypothesis)

@@ -97,8 +97,13 @@ def null_text(p: EffectParameter) -> str:
 def remark_text(p: EffectParameter) -> str:
     """What else is to be said about a parameter."""
     remarks = ["a shape"] if p.is_shape else []
-    if len(p.grid) > 1:
+    if p.of_range:
+        shares = ", ".join(f"{share:g}" for share in p.grid)
+        remarks.append(f"a diagnosis tries {shares} of the largest deflection that way")
+    elif len(p.grid) > 1:
         remarks.append(f"a diagnosis tries {len(p.grid)} values, {p.grid[0]:g} to {p.grid[-1]:g}")
+    if p.held:
+        remarks.append("held")
     if p.weak:
         remarks.append("often weak" if len(p.grid) > 1 else "often weak, held by its prior")
     return "; ".join(remarks)

@@ -3,12 +3,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import product
-
-import numpy as np
-from numpy.typing import NDArray
 
 from jointscope.robots.effect_kinds.effect import EffectParameter
 from jointscope.robots.effect_kinds.effect_at import EffectAt
@@ -17,13 +14,10 @@ from jointscope.robots.files.effect_catalogue import catalogue
 from jointscope.robots.files.effect_editing import cannot_be_added
 from jointscope.robots.model.robot import Robot
 
-Array = NDArray[np.float64]
-
 BEARING_FREQUENCIES = (4.0, 6.0, 9.0, 14.0, 22.0)  # [Hz] resonance of a body on its soft bearing
 BEARING_DAMPING_RATIOS = (0.15,)
 
 Range = Mapping[str, float]  # largest deflections of a spring, "forward" and "backward" [rad]
-LEAST = 0.1  # share of the larger one that each side of a range has at least
 
 # how much of a better integrator's correction the data want: 0 none, 1 all of it
 WHOLE_DEFECT = EffectParameter("share", "1", start=1.0, prior_sigma=10.0, sign="+")
@@ -79,22 +73,6 @@ def hypotheses_of(
             sizes = tuple(p for p in parameters if not p.is_shape)
             for shapes in _grid(here, parameters, scanned_orders or {}, (deflections or {}).get(owner, {})):
                 found.append(EffectHypothesis(here, sizes, shapes))
-    return found
-
-
-def deflections_of(robot: Robot, seen: Iterable[Array]) -> dict[str, Range]:
-    """How far the spring of each elastic joint was deflected, by joint.
-
-    Args:
-        robot: whose layout the states have.
-        seen: states as springs see them, shape (m, d) each.
-    """
-    layout, found = robot.layout, dict[str, Range]()
-    parts = [x[:, layout.joint_q] - x[:, layout.motor_q] for x in seen]
-    for j in layout.elastic_joints:
-        forward, backward = (max(float(np.max(side * part[:, j])) for part in parts) for side in (1.0, -1.0))
-        least = max(LEAST * max(forward, backward), 1e-9)
-        found[robot.joints[j]] = {"forward": max(forward, least), "backward": max(backward, least)}
     return found
 
 

@@ -1,0 +1,52 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Knots of springs' curves are placed where encoders saw the springs deflected, and nowhere else."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from lever_bench import hanging, lever
+
+from jointscope.graphs.starts.spring_knots import with_knots
+from jointscope.robots.files.effect_editing import add_effect, remove_effect
+
+KNOTS = ("swing.spring_pieces_2.forward", "swing.spring_pieces_2.backward")
+
+
+@pytest.fixture
+def with_pieces(tmp_path):
+    return add_effect(remove_effect(lever(tmp_path), "spring_curve@swing"), "spring_pieces_2@swing")
+
+
+def test_knots_that_nobody_chose_lie_at_the_ends_of_the_range_and_are_held(with_pieces):
+    rests = hanging(20, 1)
+    d = rests.q_link - rests.q_motor
+    found = with_knots(with_pieces, [rests])
+    values = [found.parameters[name].value for name in KNOTS]
+    np.testing.assert_allclose(values, [d.max(), -d.min()])
+    assert all(found.parameters[name].fixed for name in KNOTS)
+    twice = replace(rests, q_link=rests.q_motor + 2.0 * d)
+    wider = with_knots(with_pieces, [rests, twice])
+    np.testing.assert_allclose([wider.parameters[name].value for name in KNOTS], [2.0 * d.max(), -2.0 * d.min()])
+
+
+def test_a_side_that_was_never_loaded_has_a_tenth_of_the_other(with_pieces):
+    rests = hanging(20, 1)
+    ahead = replace(rests, q_link=rests.q_motor + np.abs(rests.q_link - rests.q_motor))
+    found = with_knots(with_pieces, [ahead])
+    far = np.max(ahead.q_link - ahead.q_motor)
+    np.testing.assert_allclose([found.parameters[name].value for name in KNOTS], [far, 0.1 * far])
+
+
+def test_knots_that_a_file_holds_stay(with_pieces):
+    chosen = {name: replace(with_pieces.parameters[name], value=0.3, fixed=True) for name in KNOTS}
+    robot = replace(with_pieces, parameters={**with_pieces.parameters, **chosen})
+    assert with_knots(robot, [hanging(20, 1)]) is robot
+
+
+def test_without_encoders_on_the_links_knots_stay_where_the_file_has_them(with_pieces):
+    found = with_knots(with_pieces, [replace(hanging(20, 1), q_link=None)])
+    assert [found.parameters[name].value for name in KNOTS] == [0.05, 0.05]
+    assert all(found.parameters[name].fixed for name in KNOTS)
