@@ -227,7 +227,7 @@ class _Search:
 def leading(found: KindsDiagnosis, refused: Collection[str] = ()) -> AcrossKinds | None:
     """The effect to add: the first that a kind misses, of these the one with the most evidence; None without."""
     missing = {c.label: c for c in found.candidates if c.verdict == "missing" and c.label not in refused}
-    first = {}
+    first: dict[str, AcrossKinds] = {}
     for kind in found.kinds:
         shown = [c for label in found.order_of(kind) if (c := missing.get(label)) is not None and kind in c.shown_by]
         first |= {shown[0].label: shown[0]} if shown else {}
