@@ -121,6 +121,18 @@ def test_nothing_comes_into_a_true_model(kinds, rod, seen):
 
 
 @pytest.mark.slow
+def test_rests_and_poses_grow_one_model_without_motion(seen):
+    rests, drift = lighter(hanging(40, 3, rigid=True)), "tracker_drift@robot:x=1e-4,z=0"
+    given = KindsRecordings(poses=(sighted(seen, 40, "poses", drift),), rests=(rests,))
+    found = discover_kinds(seen, given, KindsRecordings(poses=(sighted(seen, 20, "others", drift),)))
+    assert labels(found) == {"load_scale@robot", "tracker_drift@robot"} and found.adequate
+    share, along = "robot.load_scale.share", "tracker.tracker_drift.x"
+    assert value(found.robot, share, 1.0 / 0.9 - 1.0) and value(found.robot, along, 1e-4)
+    assert found.robot.parameters[along].sigma < 2e-5 and found.robot.parameters[share].sigma < 0.03
+    assert found.errors[-1][1]["poses"] < 1.3 < found.errors[0][1]["poses"]
+
+
+@pytest.mark.slow
 def test_the_command_writes_the_model_its_steps_and_its_page(rod, tmp_path, capsys, monkeypatch):
     bag, out = tmp_path / "moves.mcap", tmp_path / "found.yaml"
     write_bag(bag, moved(rod), rod)

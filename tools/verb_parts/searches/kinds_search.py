@@ -18,7 +18,7 @@ from jointscope.tools.verb_parts.rest_runs import read_all_rests
 from jointscope.tools.verb_parts.result_files import ResultFiles, write_diagnosis, write_still
 from jointscope.tools.verb_parts.searches import arm_search, rest_search
 from jointscope.tools.verb_parts.workers import check_workers
-from jointscope.tools.writing.origin import made_from, origin, other_kinds
+from jointscope.tools.writing.origin import made_from, origin
 from jointscope.tools.writing.whole_file import write_json
 
 if TYPE_CHECKING:
@@ -88,7 +88,7 @@ def run_kinds_discovery(
     given, held = _read(robot, args, workers, progress)
     found = discover_kinds(robot, given, held, progress, missing_torque=False, side_by_side=workers)
     made = origin(robot.path.name, given.motion) if given.motion else made_from(robot.path.name)
-    made |= other_kinds(found.steps[-1].model.result) | _shaken_origin(given)
+    made |= _still_origin(given)
     write_still(files, found.robot, made, partial(kinds_search_report, found), discovery_json(found, files.robot))
     return kinds_discovery_text(found)
 
@@ -133,9 +133,16 @@ def _must_have_sections(robot: Robot, args: argparse.Namespace) -> None:
         raise RobotError(no_poses(robot))
 
 
-def _shaken_origin(given: KindsRecordings) -> dict[str, Any]:
-    each = [{"path": signals.path, "sha256": signals.sha256} for signals, _ in given.shaken]
-    return {"frequency": each} if each else {}
+def _still_origin(given: KindsRecordings) -> dict[str, Any]:
+    """Recordings without motion, as the origin of a result has them."""
+    counted = {"rests": given.rests, "poses": given.poses}
+    found: dict[str, Any] = {
+        kind: [{"path": one.path, "sha256": one.sha256, "count": len(one)} for one in each]
+        for kind, each in counted.items()
+        if each
+    }
+    shaken = [{"path": signals.path, "sha256": signals.sha256} for signals, _ in given.shaken]
+    return found | ({"frequency": shaken} if shaken else {})
 
 
 def kinds_json(found: Any, arm: Any = None) -> dict[str, Any]:
