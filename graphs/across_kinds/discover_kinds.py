@@ -161,13 +161,13 @@ class _Search:
     def _why_not(self, candidate: AcrossKinds, before: SharedModel, after: SharedModel) -> str:
         """What speaks against an effect once all kinds are in one graph; empty if nothing does."""
         was, now = (errors_by_kind(model, self.given, before) for model in (before, after))
-        judged = [kind for kind in candidate.seen_by if not _by_torques(kind, self.steps[-1].found, self.given)]
         # kinds that cannot show it may give way while they lack something else: they have no say
-        worse = [kind for kind in judged if now[kind] ** 2 > (1.0 + SAME) ** 2 * was[kind] ** 2]
+        told = [kind for kind in candidate.seen_by if not _by_friction(kind, self.given)]
+        worse = [kind for kind in told if now[kind] ** 2 > (1.0 + SAME) ** 2 * was[kind] ** 2]
         if worse:
             kind = worse[0]
             return f"raises the error in {kind} from {was[kind]:.3g} to {now[kind]:.3g}"
-        judged = [kind for kind in judged if kind in candidate.shown_by]
+        judged = [k for k in told if k in candidate.shown_by and not _by_torques(k, self.steps[-1].found)]
         better = [kind for kind in judged if now[kind] ** 2 < (1.0 - MATTERS) * was[kind] ** 2]
         if judged and not better:
             return f"leaves the error in {' and '.join(judged)} as it was"
@@ -227,7 +227,7 @@ class _Search:
 def leading(found: KindsDiagnosis, refused: Collection[str] = ()) -> AcrossKinds | None:
     """The effect to add: the first that a kind misses, of these the one with the most evidence; None without."""
     missing = {c.label: c for c in found.candidates if c.verdict == "missing" and c.label not in refused}
-    first = {}
+    first: dict[str, AcrossKinds] = {}
     for kind in found.kinds:
         shown = [c for label in found.order_of(kind) if (c := missing.get(label)) is not None and kind in c.shown_by]
         first |= {shown[0].label: shown[0]} if shown else {}
@@ -244,10 +244,13 @@ def _with(step: KindsStep, candidate: AcrossKinds) -> Robot:
     return with_shared_effect(step.model.robot, candidate, hypothesis, refit)
 
 
-def _by_torques(kind: str, found: KindsDiagnosis, given: KindsRecordings) -> bool:
-    """Whether the error of a kind does not say how much of what is missing an effect explains."""
-    if kind == MOTION:
-        return found.motion is not None and found.motion.missing_torque_percent is not None
+def _by_torques(kind: str, found: KindsDiagnosis) -> bool:
+    """Whether motion is judged by torques: predictions in sigmas of a fine sensor then only must not be worse."""
+    return kind == MOTION and found.motion is not None and found.motion.missing_torque_percent is not None
+
+
+def _by_friction(kind: str, given: KindsRecordings) -> bool:
+    """Whether rests of motors alone are asked, where a wider band of friction hides what is missing."""
     return kind == RESTS and given.rests[0].q_link is None
 
 

@@ -13,7 +13,6 @@ from jointscope.graphs.across_kinds.kinds_recordings import KindsRecordings
 from jointscope.graphs.across_kinds.said_by_kinds import MOTION, RESTS
 from jointscope.graphs.calibration.base_model import BaseModel
 from jointscope.graphs.calibration.calibrate import calibrate
-from jointscope.graphs.calibration.calibration_result import CalibrationResult
 from jointscope.graphs.frequency.compare_frequency import frequency_errors
 from jointscope.graphs.joint_kinds.beside_motion import calibrate_beside_motion
 from jointscope.graphs.joint_kinds.calibrate_with_rests import WithRests, calibrate_with_rests
@@ -49,13 +48,6 @@ class SharedModel:
     still: WithRests | None
     poses: PoseCalibration | None
     weights: tuple[RestSet, ...]
-
-    @property
-    def result(self) -> CalibrationResult | WithRests:
-        """The calibration."""
-        found = self.still if self.motion is None else self.motion.result
-        assert found is not None
-        return found
 
 
 def calibrate_shared(

@@ -81,6 +81,8 @@ def motor_effects(
         laws = {part: values[f"{joint}.{part}"] for part in LAWS if f"{joint}.{part}" in values}
         if not laws:
             continue
+        sign = {part: -1.0 for part in WAVES} if joint in arm.misread else dict[str, float]()
+        laws = {part: sign.get(part, 1.0) * value for part, value in laws.items()}
         motion = _Motion.of(arm, pose, values, x, i, sharpness[i])
         order = values.get(f"{joint}.{RIPPLE[2]}", 0.0)
         own = {part: motion.offset(part, order) for part in laws}
@@ -94,11 +96,16 @@ def motor_effects(
         turning = motion.sharper()
         sharper[:, :, i] = _summed(laws, {part: turning.torque(part, order) for part in DRY if part in laws})
         stiffer[i] = 3.0 * max(laws.get(CUBIC, 0.0), 0.0) * motion.square
-        waves |= {f"{joint}.{part}": (i, own[part], beside[part]) for part in laws}
+        waves |= {f"{joint}.{p}": (i, _times(sign.get(p), own[p]), _times(sign.get(p), beside[p])) for p in laws}
         if order:
             cos, sin = (laws.get(part, 0.0) for part in RIPPLE[:2])
             waves[f"{joint}.{RIPPLE[2]}"] = i, *motion.by_order(order, cos, sin)
     return MotorEffects(waves, offset, torque, sharper, stiffer)
+
+
+def _times(sign: float | None, wave: Complex | None) -> Complex | None:
+    """A wave, or that of the other sign."""
+    return wave if sign is None or wave is None else np.asarray(sign * wave)
 
 
 def measured_torques(

@@ -140,6 +140,22 @@ def discover_arm(
         added, result = following
 
 
+def scored(
+    result: Calibrated, candidates: Sequence[ArmCandidate], holdout: Sequence[Poses], shaken: Sequence[Shaken]
+) -> ArmDiscovery:
+    """A diagnosis as a search that adds nothing, with the errors of its model on recordings that never chose.
+
+    Args:
+        result: the calibrated arm.
+        candidates: what it may lack.
+        holdout: poses that were held out.
+        shaken: recordings of the arm shaken that were held out.
+    """
+    errors = frequency_errors(result.robot, shaken) if shaken else ()
+    step = ArmStep(None, result, _heldout(result.robot, holdout), errors, tuple(candidates))
+    return ArmDiscovery((step,), "", tuple(placed(result.robot, holdout)[1]) if holdout else ())
+
+
 def diagnosed(
     result: Calibrated, sessions: Sequence[Poses], recordings: Sequence[Shaken], report: Report
 ) -> list[ArmCandidate]:

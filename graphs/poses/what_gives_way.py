@@ -4,13 +4,14 @@
     q_j = q_motor_j + sum_o (c_o cos(o q_motor_j) + s_o sin(o q_motor_j)) + e_j + x_j - sign(g_j) w_j
     k x + k3 x^3 = g,    beta = g_beta / k_beta
 
-c and s are the eccentricity of an encoder (o = 1) and the ripple of a gear (o waves per turn), e is what the
+c and s are the eccentricity of an encoder (o = 1; with the other sign where it is an effect of the catalogue, which is
+what the reading has too much) and the ripple of a gear (o waves per turn), e is what the
 transmission does unseen, g the torque of gravity, w the backlash as Neubauer et al. (2015, eq. 18) have it.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -28,10 +29,11 @@ class WhatGivesWay:
     Args:
         joints: of the chain.
         values: of all parameters; those that are not there do not act.
+        misread: joints whose eccentricity is what the reading has too much.
     """
 
-    def __init__(self, joints: Sequence[str], values: Mapping[str, float]):
-        self._joints, self._values = tuple(joints), values
+    def __init__(self, joints: Sequence[str], values: Mapping[str, float], misread: Collection[str] = ()):
+        self._joints, self._values, self._misread = tuple(joints), values, misread
         self._drives = self._there(STIFFNESS)
         self._gaps = self._there(BACKLASH)
         self._bearings = {(j, axis): name for axis, part in enumerate(BEARING) for j, name in self._there(part).items()}
@@ -45,7 +47,8 @@ class WhatGivesWay:
         """What encoders and gears are off at angles of shape (m, n) [rad]."""
         off = np.zeros_like(q)
         for j, (cos, sin), order in self._waves():
-            off[:, j] += self._values[cos] * np.cos(order * q[:, j]) + self._values[sin] * np.sin(order * q[:, j])
+            wave = self._values[cos] * np.cos(order * q[:, j]) + self._values[sin] * np.sin(order * q[:, j])
+            off[:, j] += self._sign(j, cos) * wave
         return off
 
     def deflections(self, point: ChainPoint) -> tuple[Array, Array]:
@@ -81,7 +84,8 @@ class WhatGivesWay:
         found: dict[str, Array] = {}
         n = len(self._joints)
         for j, (cos, sin), order in self._waves():
-            c, s = np.cos(order * q[:, j]), np.sin(order * q[:, j])
+            sign = self._sign(j, cos)
+            c, s = sign * np.cos(order * q[:, j]), sign * np.sin(order * q[:, j])
             parts = {cos: c, sin: s}
             if cos.endswith(RIPPLE[0]):
                 slope = self._values[sin] * c - self._values[cos] * s
@@ -99,6 +103,10 @@ class WhatGivesWay:
             tilt = point.bearing_gravity[:, j, axis] / self._values[name] / self._values[name]  # a trial may be huge
             found[name] = -by_yield[:, :, n * (1 + axis) + j] * tilt[:, None]
         return found
+
+    def _sign(self, j: int, name: str) -> float:
+        """Of a wave."""
+        return -1.0 if name.endswith(WAVES[0]) and self._joints[j] in self._misread else 1.0
 
     def _waves(self) -> Iterator[tuple[int, tuple[str, str], float]]:
         """Joint, names of both amplitudes, and waves per turn."""

@@ -8,6 +8,7 @@ import math
 PREFIXES = {0: "", -3: "m", -6: "µ", -9: "n"}
 MOST_DECIMALS = 7  # more zeros than this are hard to count; then powers of ten are written
 SUPERSCRIPTS = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
+NO_CHANGE = 0.01  # of chi-square
 
 
 def decimals_of(sigma: float) -> int:
@@ -52,6 +53,11 @@ def significant(value: float, digits: int = 3) -> str:
         mantissa = value / 10.0**exponent
         return minus(f"{mantissa:.{digits - 1}f}·10{str(exponent).translate(SUPERSCRIPTS)}")
     return minus(f"{value:.{max(digits - 1 - exponent, 0)}f}")
+
+
+def fall_text(fall: float) -> str:
+    """By how much chi-square falls; what rounding makes of nothing, or less than a hundredth, is no change."""
+    return "no change" if fall < NO_CHANGE else significant(fall, 3)
 
 
 def percent(share: float) -> str:

@@ -23,7 +23,7 @@ from jointscope.tools.report.page.answer_box import checks_listed
 from jointscope.tools.report.page.page import Key, Section, figure, listed, page, table, text_cells
 from jointscope.tools.report.page.plot import Axes, Bars, Curve, plot
 from jointscope.tools.terminal.searches.arm_discovery_text import step_table
-from jointscope.tools.verdicts.pose_judgement import judge_poses
+from jointscope.tools.verdicts.pose_judgement import judge_poses, outliers_of
 
 Array = NDArray[np.float64]
 BINS = 30
@@ -66,7 +66,7 @@ def _verdict(result: PoseCalibration) -> Section:
     items = checks_listed(judgement.checks)
     items += [
         f"pose {escape(each.name)} of {escape(each.path)} was left out: {each.sigmas:.0f} sigma away"
-        for each in result.left_out
+        for each in outliers_of(result)
     ]
     return Section("verdict", "Is it good?", listed(items), judgement.headline)
 

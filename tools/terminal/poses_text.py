@@ -16,7 +16,7 @@ from jointscope.tools.bags.clocks.durations import counted
 from jointscope.tools.presentation.numbers import significant, with_sigma
 from jointscope.tools.presentation.tip_numbers import target_rows, tip_cells, tip_head
 from jointscope.tools.terminal.text_table import text_table
-from jointscope.tools.verdicts.pose_judgement import judge_poses
+from jointscope.tools.verdicts.pose_judgement import judge_poses, outliers_of
 
 SHOWN_OUT, SHOWN_COMBINATIONS = 5, 18
 SHOWN_SIZES = ("mean", "p90", "max")
@@ -66,10 +66,11 @@ def _verdict(result: PoseCalibration, beside: bool) -> str:
     lines += [f"  ! {check.name}? {check.text}" for check in judgement.checks if check.level in ("warn", "bad")]
     lines += [f"  - {check.text}" for check in judgement.checks if check.level in ("good", "info")]
     lines += [f"  - {notice.text}" for problem in result.problems for notice in problem.poses.notices]
-    if result.left_out:
-        first = result.left_out[:SHOWN_OUT]
+    odd = outliers_of(result)
+    if odd:
+        first = odd[:SHOWN_OUT]
         said = ", ".join(f"{each.name} of {each.path} ({each.sigmas:.0f} sigma)" for each in first)
-        more = f" and {len(result.left_out) - SHOWN_OUT} more" if len(result.left_out) > SHOWN_OUT else ""
+        more = f" and {len(odd) - SHOWN_OUT} more" if len(odd) > SHOWN_OUT else ""
         lines.append(f"  - left out as outliers: pose {said}{more}")
     return "\n".join(lines)
 

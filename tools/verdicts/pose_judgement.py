@@ -15,6 +15,7 @@ from jointscope.graphs.poses.linear_poses import LinearPoses
 from jointscope.graphs.poses.pose_set import PoseSet
 from jointscope.graphs.poses.screen_contacts import moved_contacts
 from jointscope.graphs.poses.tip_errors import summary
+from jointscope.graphs.poses.trimmed_poses import Outlier
 from jointscope.graphs.poses.untold_distances import untold_distance
 from jointscope.graphs.poses.what_moved import Step, what_moved, with_ends
 from jointscope.robots.geometry.error_parameters import BACKLASH
@@ -30,6 +31,7 @@ UNSEEN = 0.05  # of the target's noise: what transmissions make of it at the end
 METRE = 1.0  # [m]
 SURE = 3.0  # [sigma]
 SHOWN = 4
+GIVEN_UP = 0.5  # share of the poses on one side of a step that are left out where they are that side
 OUT = 0.1  # share of the poses that may be left out
 ELSEWHERE = (10.0, 100.0)  # times what is left at the poses that the target may be uncertain in other postures
 BEYOND = 3.0  # [sigma of the prior] that no geometric error should reach; beyond FAR the calibration is worth nothing
@@ -95,6 +97,8 @@ def _outliers(result: PoseCalibration) -> Check:
     if max(shares) <= OUT:
         return Check("good", name, f"{text}{_elsewhere_held(result)}.")
     hint = "look at each before you leave them out for good: targets or readings are wrong, or an effect is missing"
+    if result.left_out and not outliers_of(result):
+        hint = "all of them are on one side of what moved, which is named, and are no outliers"
     out = "".join(f", {target} of {count} of {seen[target] + count}" for target, count in odd.items())
     together = _elsewhere_held(result)
     return Check("warn", name, f"{whole} of {total} poses{out} were left out{together}; {hint}.")
@@ -127,6 +131,25 @@ def moved_during(result: PoseCalibration) -> Step | None:
     """What moved during a session, or None; of one calibration it is asked once."""
     problems = with_ends(result.problems, result.whole)
     return what_moved(LinearPoses.at(result.robot, problems, result.calibrations), problems, result.calibrations)
+
+
+def outliers_of(result: PoseCalibration) -> tuple[Outlier, ...]:
+    """What was left out, but for the poses on that side of a step, named by itself, which the fit gave up."""
+    step = moved_during(result)
+    if step is None:
+        return result.left_out
+    names = next(problem.poses.names for problem in result.whole if problem.poses.path == step.path)
+    first = names.index(step.after) if step.before else 0
+    given_up = set[str]()
+    for side in (names[:first], names[first:]):
+        out = {each.pose for each in result.left_out if each.pose in side and _is_of_step(each, step)}
+        given_up |= out if len(out) > GIVEN_UP * len(side) else set()
+    return tuple(each for each in result.left_out if not (_is_of_step(each, step) and each.pose in given_up))
+
+
+def _is_of_step(each: Outlier, step: Step) -> bool:
+    """Whether a row is one that moved: of the session, and of the target where one moved alone."""
+    return each.path == step.path and (not step.target or each.target in ("", step.target))
 
 
 def _geometric(result: PoseCalibration) -> set[str]:

@@ -11,10 +11,13 @@ import pytest
 from lever_bench import C0, hanging, lever, lever_in_sight
 
 from jointscope import simulate
+from jointscope.factors.calibration import Calibration
 from jointscope.graphs.across_kinds.discover_kinds import NOTHING_LEFT, discover_kinds, leading
 from jointscope.graphs.across_kinds.kinds_recordings import KindsRecordings
 from jointscope.graphs.across_kinds.said_by_kinds import AcrossKinds, Said
 from jointscope.graphs.across_kinds.shared_effect import own_names, with_shared_effect, without_shared_effect
+from jointscope.graphs.poses.tip_errors import whitened
+from jointscope.graphs.poses.tracker_start import placed
 from jointscope.robots.errors import RecordingError
 from jointscope.robots.files.robot_file import load_robot
 from jointscope.robots.files.robot_writer import robot_text
@@ -118,6 +121,18 @@ def test_nothing_comes_into_a_true_model(kinds, rod, seen):
 
 
 @pytest.mark.slow
+def test_rests_and_poses_grow_one_model_without_motion(seen):
+    rests, drift = lighter(hanging(40, 3, rigid=True)), "tracker_drift@robot:x=1e-4,z=0"
+    given = KindsRecordings(poses=(sighted(seen, 40, "poses", drift),), rests=(rests,))
+    found = discover_kinds(seen, given, KindsRecordings(poses=(sighted(seen, 20, "others", drift),)))
+    assert labels(found) == {"load_scale@robot", "tracker_drift@robot"} and found.adequate
+    share, along = "robot.load_scale.share", "tracker.tracker_drift.x"
+    assert value(found.robot, share, 1.0 / 0.9 - 1.0) and value(found.robot, along, 1e-4)
+    assert found.robot.parameters[along].sigma < 2e-5 and found.robot.parameters[share].sigma < 0.03
+    assert found.errors[-1][1]["poses"] < 1.3 < found.errors[0][1]["poses"]
+
+
+@pytest.mark.slow
 def test_the_command_writes_the_model_its_steps_and_its_page(rod, tmp_path, capsys, monkeypatch):
     bag, out = tmp_path / "moves.mcap", tmp_path / "found.yaml"
     write_bag(bag, moved(rod), rod)
@@ -175,6 +190,29 @@ def test_names_that_all_kinds_share_are_one_number(seen):
     found = across(mass.label, poses=Said("missing", {"mass": (0.4, 0.1, "kg")}), motion=Said("possible", {}))
     grown = with_shared_effect(seen, found, mass)
     assert grown.has_effect("link_mass", "swing") and grown.parameters["swing.link_mass.mass"].value == 0.4
+
+
+def test_an_eccentric_encoder_is_one_number_with_one_sign_for_motion_and_poses(seen):
+    (wave,) = (h for h in hypotheses(seen.joints, seen.parameters, True) if h.kind.id == "encoder_eccentricity")
+    sizes = {"cos": (3e-4, 1e-6, "rad"), "sin": (-2e-4, 1e-6, "rad")}
+    grown = with_shared_effect(seen, across(wave.label, poses=Said("missing", sizes), motion=Said("absent", {})), wave)
+    assert grown.has_effect("encoder_eccentricity", "swing")
+    poses = sighted(seen, 30, "poses", "encoder_eccentricity@swing:cos=-3e-4,sin=2e-4")  # what is added to readings
+    _, (problem,) = placed(grown, [poses])
+    assert whitened(grown, grown.poses, [problem]) < 1.3 < 5.0 < whitened(seen, seen.poses, [problem])
+    calibration = problem.start(Calibration.of(grown))[1]
+    point, size = problem.point(calibration), 1e-7
+    for name in ("cos", "sin"):
+        full = f"swing.encoder_eccentricity.{name}"
+        value = grown.parameters[full].value
+        ends = [
+            problem.of_robot(grown.with_values({full: value + sign * size})).point(
+                Calibration.of(grown.with_values({full: value + sign * size}))
+            )
+            for sign in (1.0, -1.0)
+        ]
+        slope = (ends[0].target - ends[1].target) / (2.0 * size)
+        np.testing.assert_allclose(point.by_value[full], slope, atol=1e-6)
 
 
 def test_the_first_of_each_kind_is_a_leader_and_the_one_with_most_evidence_comes_in():

@@ -15,7 +15,7 @@ from jointscope.graphs.frequency.stages import first_stage, next_stage, with_col
 from jointscope.robots.files.robot_file import load_robot
 from jointscope.robots.geometry.added_effect import RIGID, at_null, with_effect
 from jointscope.robots.geometry.arm_effects import KINDS, ArmHypothesis
-from jointscope.robots.geometry.flexible_arm import LOSS
+from jointscope.robots.geometry.flexible_arm import LOSS, FlexibleArm
 
 BY_ID = {kind.id: kind for kind in KINDS}
 SMALL = {  # sizes at which the balance is still linear in them
@@ -121,3 +121,19 @@ def test_a_soft_locked_joint_changes_the_balance_by_its_compliance_at_first(robo
     kappa = RIGID * (1.0 + 1j * LOSS * pose.w[:, None, None])
     slope = -rigid.stiffness(values).by_spring[spring] * kappa**2
     np.testing.assert_allclose(change * k, slope, rtol=0.02, atol=0.02 * np.abs(slope).max())
+
+
+def test_an_eccentricity_of_the_catalogue_is_the_same_with_the_other_sign(robot, pose):
+    hypothesis = effect("encoder_eccentricity@joint2")
+    problem = settled(with_effect(robot, hypothesis, dict(zip(hypothesis.names, (1e-3, -2e-3), strict=True))), pose)
+    values, x, sharpness = problem.stage.values, problem.stage.x, problem.sharpness(problem.stage.values)
+    misread = FlexibleArm(problem.robot)
+    misread.misread = frozenset({"joint2"})
+    added = motor_effects(problem.arm, problem.pose, values, sharpness, x)
+    turned = {n: -value if n in hypothesis.names else value for n, value in values.items()}
+    read = motor_effects(misread, problem.pose, turned, sharpness, x)
+    np.testing.assert_allclose(read.offset, added.offset)
+    np.testing.assert_allclose(read.torque, added.torque)
+    for name in hypothesis.names:
+        np.testing.assert_allclose(read.waves[name][1], -added.waves[name][1])
+        np.testing.assert_allclose(read.waves[name][2], -added.waves[name][2])

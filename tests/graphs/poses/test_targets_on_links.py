@@ -146,8 +146,10 @@ def test_zeros_behind_the_only_target_stay_and_those_before_it_come_out(tmp_path
     poses, truth = simulate_poses(robot, 60, 3)
     found = calibrate_poses(robot, [poses])
     parameters, values = found.robot.parameters, truth["parameters"]
-    assert all(abs(parameters[n].value) < 0.1 * parameters[n].prior_sigma for n in BEHIND)
-    assert all(parameters[n].sigma > 0.98 * parameters[n].prior_sigma for n in BEHIND)
+    for name in BEHIND:  # the little that the weight tells moves them by no more than it can
+        p = parameters[name]
+        share = p.sigma / p.prior_sigma
+        assert share > 0.98 and abs(p.value) < 3.0 * p.prior_sigma * np.sqrt(1.0 - share**2), name
     assert not {*BEHIND} & {*found.told}
     assert np.abs(off(found, values, found.told)).max() < 3.5
     assert abs(parameters["joint2.stiffness"].value / values["joint2.stiffness"] - 1.0) < 0.1

@@ -206,8 +206,13 @@ def test_simulate_discover_and_diagnose_on_poses(tmp_path, monkeypatch, capsys):
     assert content["steps"][1]["heldout_error"] < content["steps"][0]["heldout_error"]
     assert content["adequate"] is True and "What was missing" in (tmp_path / "f.html").read_text()
     assert load_robot("found.yaml").parameters["joint5.stiffness"].value == pytest.approx(25000.0, rel=0.3)
-    assert main(["diagnose", "tx90l", "--poses", "train.csv", "--json", "d.json"]) == 0
-    first = json.loads((tmp_path / "d.json").read_text())["candidates"][0]
+    capsys.readouterr()
+    assert main(["diagnose", "tx90l", "--poses", "train.csv", "--holdout-poses", "test.csv", "--json", "d.json"]) == 0
+    assert "held out: 90 % [mm]" in capsys.readouterr().out
+    diagnosed = json.loads((tmp_path / "d.json").read_text())
+    assert diagnosed["poses"] == pytest.approx(content["steps"][0]["poses"])
+    assert diagnosed["heldout_error"] == diagnosed["by_kind"]["poses"] > 1.2
+    first = diagnosed["candidates"][0]
     assert (first["effect"], first["owner"], first["verdict"]) == ("joint_elasticity", "joint5", "missing")
 
 
@@ -220,9 +225,14 @@ def test_simulate_discover_and_diagnose_on_poses(tmp_path, monkeypatch, capsys):
             ["diagnose", "tx90l", "--frequency", "b.mcap", "--holdout-frequency", "b.mcap"],
             "b.mcap is given with --frequency and held out",
         ),
+        (["discover", "doggy", "a.mcap", "--frequency", "b.mcap", "-o", "a.yaml"], "doggy.yaml has no section `freq"),
         (
-            ["discover", "doggy", "a.mcap", "--frequency", "b.mcap", "-o", "a.yaml"],
-            "`discover` grows a model by motion, by rests, or by --poses and --frequency; `jointscope diagnose` takes",
+            ["discover", "doggy", "a.mcap", "--poses", "b.csv", "-o", "a.yaml", "--rrd", "a.rrd"],
+            "--rrd shows motion alone; leave it out where several kinds are searched",
+        ),
+        (
+            ["discover", "doggy", "a.mcap", "--poses", "b.csv", "-o", "a.yaml", "--restart"],
+            "--restart: a search over several kinds keeps no steps on disk; leave it out",
         ),
         (["diagnose", "tx90l", "--poses", "p.csv", "--holdout", "b.mcap"], "--holdout is for recordings of motion"),
         (

@@ -13,7 +13,7 @@ from jointscope.graphs.joint_kinds.effect_judge import ArmCandidate
 from jointscope.graphs.poses.tip_errors import TipErrors, summary
 from jointscope.robots.geometry.arm_effects import FREQUENCY, POSES
 from jointscope.tools.bags.clocks.durations import counted
-from jointscope.tools.presentation.numbers import percent, significant
+from jointscope.tools.presentation.numbers import fall_text, percent, significant
 from jointscope.tools.terminal.text_table import text_table
 from jointscope.tools.verdicts.pose_judgement import moved_during
 
@@ -35,7 +35,7 @@ def ranking_text(candidates: Sequence[ArmCandidate], said: str, kinds: Sequence[
     """
     rows = []
     for c in candidates[:SHOWN]:
-        row = [c.hypothesis.label, c.verdict, significant(c.score, 3), f"{c.p_value:.1g}"]
+        row = [c.hypothesis.label, c.verdict, fall_text(c.score), f"{c.p_value:.1g}"]
         for kind in kinds:
             gain = c.gains.get(kind)
             row += ["-", "-"] if gain is None else [f"{100.0 * gain.share:.1f} %", f"{100.0 * gain.helped:.0f} %"]
@@ -159,6 +159,14 @@ def arm_discovery_text(found: ArmDiscovery) -> str:
     return "\n\n".join(parts)
 
 
+def heldout_table(found: ArmDiscovery) -> list[str]:
+    """Errors of a model that was diagnosed beside those on recordings that were held out; nothing without any."""
+    if not (found.holdout or found.steps[0].shaken):
+        return []
+    head, rows = step_table(found)
+    return [text_table(head[1:], [row[1:] for row in rows], "<" + ">" * (len(head) - 2))]
+
+
 def recordings_said(found: ArmDiscovery) -> str:
     """How much was fitted."""
     last = found.steps[-1].calibrated
@@ -170,7 +178,7 @@ def recordings_said(found: ArmDiscovery) -> str:
 
 def step_table(found: ArmDiscovery) -> tuple[list[str], list[list[str]]]:
     """Names of the columns, and a row per step; those of recordings that were held out only where there are any."""
-    head, rows = ["step", "added"], []
+    head, rows = ["step", "model"], []
     if POSES in found.kinds:
         head += ["90 % [mm]", "largest [mm]", *(["held out: 90 % [mm]", "largest [mm]"] if found.holdout else [])]
     shaken = bool(found.steps[-1].shaken)

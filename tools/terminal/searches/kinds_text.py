@@ -5,6 +5,7 @@ from __future__ import annotations
 
 from jointscope.graphs.across_kinds.diagnose_kinds import KindsDiagnosis
 from jointscope.graphs.across_kinds.said_by_kinds import MOTION, RESTS, AcrossKinds
+from jointscope.graphs.joint_kinds.discover_arm import ArmDiscovery
 from jointscope.robots.geometry.arm_effects import FREQUENCY, POSES
 from jointscope.tools.presentation.numbers import significant
 from jointscope.tools.terminal.diagnosis_text import diagnosis_text
@@ -16,8 +17,13 @@ WORDS = {MOTION: "motion", POSES: "poses", FREQUENCY: "responses", RESTS: "rests
 HEAD = ["effect", "verdict", "shown by", "cannot be shown by", "speaks against it", "size", "look-alikes"]
 
 
-def kinds_text(found: KindsDiagnosis) -> str:
-    """The ranking over all kinds first, then what each kind says."""
+def kinds_text(found: KindsDiagnosis, arm: ArmDiscovery | None = None) -> str:
+    """The ranking over all kinds first, then what each kind says.
+
+    Args:
+        found: the diagnosis.
+        arm: its poses and frequency responses with their errors on those held out; None without.
+    """
     parts = [
         "\n".join([kinds_headline(found), *(f"  - {sentence}" for sentence in kinds_sentences(found))]),
         text_table(HEAD, kinds_rows(found), "<" * len(HEAD)),
@@ -30,6 +36,7 @@ def kinds_text(found: KindsDiagnosis) -> str:
         kinds = _kinds(found.arm_kinds)
         ranking = arm_discovery_text.ranking_text(found.arm, f"{kinds} alone", found.arm_kinds)
         parts.append(f"{kinds[0].upper()}{kinds[1:]} alone:\n{ranking}")
+        parts += [] if arm is None else arm_discovery_text.heldout_table(arm)
     if found.rests is not None:
         parts.append(f"Rests alone:\n{rest_search_text.rest_search_text(found.rests)}")
     return "\n\n".join(parts)

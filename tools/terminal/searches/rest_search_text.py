@@ -7,7 +7,7 @@ from collections.abc import Sequence
 
 from jointscope.graphs.rest_search.discover_rests import RestDiscovery
 from jointscope.graphs.rest_search.rest_judge import RestCandidate
-from jointscope.tools.presentation.numbers import significant, with_sigma
+from jointscope.tools.presentation.numbers import fall_text, significant, with_sigma
 from jointscope.tools.terminal.text_table import text_table
 
 SHOWN = 8
@@ -87,7 +87,7 @@ def ranking_table(tested: Sequence[RestCandidate]) -> tuple[list[str], list[list
     for c in tested[:SHOWN]:
         judged = ["-", "-"] if c.gains is None else [significant(c.gain, 3), f"{100.0 * c.helped:.0f} %"]
         names = [*c.look_alikes[:MOST_NAMES], *(["..."] if len(c.look_alikes) > MOST_NAMES else [])]
-        row = [c.label, c.verdict, significant(c.score, 3), str(c.dof), f"{c.p_value:.1g}", *judged, ", ".join(names)]
+        row = [c.label, c.verdict, fall_text(c.score), str(c.dof), f"{c.p_value:.1g}", *judged, ", ".join(names)]
         rows.append(row)
     head = ["effect", "verdict", "chi2 falls by", "dof", "p", "log likelihood left out", "of the groups", "look-alikes"]
     return head, rows

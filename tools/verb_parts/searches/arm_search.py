@@ -44,16 +44,16 @@ def run_arm_search(
         JointscopeError: the recordings cannot be used, or a file cannot be written; then none is.
     """
     from jointscope.graphs.joint_kinds.discover_arm import (
-        ArmDiscovery,
-        ArmStep,
         calibrated,
         diagnosed,
         discover_arm,
+        scored,
     )
     from jointscope.tools.bags.at_poses.read_poses import read_poses
     from jointscope.tools.terminal.searches.arm_discovery_text import (
         arm_discovery_text,
         explained_sentences,
+        heldout_table,
         limit_sentences,
         moved_sentences,
         ranking_text,
@@ -74,16 +74,17 @@ def run_arm_search(
         result = calibrated(robot, sessions, recordings)
         progress("looking for effects", 0.9)
         candidates = diagnosed(result, sessions, recordings, progress)
-        found = ArmDiscovery((ArmStep(None, result, None, (), tuple(candidates)),), "")
+        found = scored(result, candidates, held, held_shaken)
         if files.json is not None:
             ranked = [candidate_json(c) for c in candidates]
             content = {"adequate": _adequate(candidates), "moved": moved_json(result), "candidates": ranked}
-            write_json(files.json, content)
+            write_json(files.json, content | heldout_json(found))
         leading = [c for c in candidates if c.verdict == "missing"][:3]
         said = explained_sentences(candidates) + [line for c in leading for line in told_apart(c)]
         said += unseen_sentences(candidates, found.kinds if len(found.kinds) > 1 else ())
         said += limit_sentences(found.steps[0])
-        said = [*moved_sentences(result), ranking_text(candidates, recordings_said(found), found.kinds), *said]
+        ranking = ranking_text(candidates, recordings_said(found), found.kinds)
+        said = [*moved_sentences(result), *heldout_table(found), ranking, *said]
         return "\n\n".join(said)
     found = discover_arm(robot, sessions, held, progress, recordings, held_shaken)
     write_still(files, found.robot, _origin(found, robot), partial(_page, found), _discovery(found, files.robot))
@@ -135,6 +136,14 @@ def _origin(found: Any, robot: Robot) -> dict[str, Any]:
     last, made = found.steps[-1].calibrated, made_from(robot.path.name)
     made |= {} if last.poses is None else pose_origin(last.poses, robot)
     return made | ({} if last.frequency is None else frequency_origin(last.frequency, robot))
+
+
+def heldout_json(found: Any) -> dict[str, Any]:
+    """Errors of a model that was diagnosed on recordings that were held out; nothing without any."""
+    if not (found.holdout or found.steps[0].shaken):
+        return {}
+    (step,) = _discovery(found, None)["steps"]
+    return {name: step[name] for name in ("train_error", "heldout_error", "floor", "by_kind", "poses")}
 
 
 def _discovery(found: Any, robot_file: Path | None) -> dict[str, Any]:

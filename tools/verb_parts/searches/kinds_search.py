@@ -7,11 +7,9 @@ import argparse
 from collections.abc import Mapping, Sequence
 from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-from jointscope.graphs.across_kinds.kinds_recordings import KindsRecordings
 from jointscope.robots.errors import RecordingError, RobotError
-from jointscope.robots.geometry.arm_effects import FREQUENCY
 from jointscope.robots.model.robot import Robot
 from jointscope.tools.terminal.progress import Progress
 from jointscope.tools.verb_parts.bag_arguments import read_bags
@@ -20,8 +18,13 @@ from jointscope.tools.verb_parts.rest_runs import read_all_rests
 from jointscope.tools.verb_parts.result_files import ResultFiles, write_diagnosis, write_still
 from jointscope.tools.verb_parts.searches import arm_search, rest_search
 from jointscope.tools.verb_parts.workers import check_workers
-from jointscope.tools.writing.origin import made_from, origin, other_kinds
+from jointscope.tools.writing.origin import made_from, origin
 from jointscope.tools.writing.whole_file import write_json
+
+if TYPE_CHECKING:
+    from jointscope.graphs.across_kinds.kinds_recordings import KindsRecordings
+
+FREQUENCY = "frequency"
 
 
 def several_graphs(args: argparse.Namespace) -> bool:
@@ -45,8 +48,8 @@ def run_kinds_diagnosis(
         RobotError: pictures were asked for, and there is no motion.
         JointscopeError: the recordings cannot be used, or a file cannot be written; then none is.
     """
-    from jointscope.graphs.across_kinds.diagnose_kinds import diagnose_kinds
-    from jointscope.tools.bags.at_poses.read_poses import read_poses
+    from jointscope.graphs.across_kinds.diagnose_kinds import ask_kinds
+    from jointscope.graphs.joint_kinds.discover_arm import scored
     from jointscope.tools.report.searches.kinds_section import kinds_section
     from jointscope.tools.terminal.searches.kinds_text import kinds_text
 
@@ -54,26 +57,15 @@ def run_kinds_diagnosis(
         raise RobotError(
             f"{robot.name}: without motion, `diagnose` of several kinds has text and --json; leave the option out"
         )
-    recordings, holdout = read_bags(args, robot, progress) if args.bags else ([], None)
-    check_workers(workers, robot, recordings)
-    found = diagnose_kinds(
-        robot,
-        recordings,
-        holdout,
-        [read_poses(path, robot) for path in args.poses],
-        read_all_shaken(robot, args.frequency, progress),
-        read_all_rests(args.rests, robot, progress),
-        read_all_rests(args.holdout_rests, robot, progress),
-        progress,
-        missing_torque=files.pictures,
-        side_by_side=workers,
-    )
-    content = kinds_json(found)
+    given, held = _read(robot, args, workers, progress)
+    found = ask_kinds(robot, given, held, progress, {"missing_torque": files.pictures, "side_by_side": workers})
+    arm = None if found.arm_base is None else scored(found.arm_base, found.arm, held.poses, held.shaken)
+    content = kinds_json(found, arm)
     if found.motion is not None:
         write_diagnosis(found.motion, files, first=[kinds_section(found)], content=content)
     elif files.json is not None:
         write_json(files.json, content)
-    return kinds_text(found)
+    return kinds_text(found, arm)
 
 
 def run_kinds_discovery(
@@ -96,7 +88,7 @@ def run_kinds_discovery(
     given, held = _read(robot, args, workers, progress)
     found = discover_kinds(robot, given, held, progress, missing_torque=False, side_by_side=workers)
     made = origin(robot.path.name, given.motion) if given.motion else made_from(robot.path.name)
-    made |= other_kinds(found.steps[-1].model.result) | _shaken_origin(given)
+    made |= _still_origin(given)
     write_still(files, found.robot, made, partial(kinds_search_report, found), discovery_json(found, files.robot))
     return kinds_discovery_text(found)
 
@@ -105,8 +97,10 @@ def _read(
     robot: Robot, args: argparse.Namespace, workers: Any, progress: Progress
 ) -> tuple[KindsRecordings, KindsRecordings]:
     """What the arguments name, for training and held out."""
+    from jointscope.graphs.across_kinds.kinds_recordings import KindsRecordings
     from jointscope.tools.bags.at_poses.read_poses import read_poses
 
+    _must_have_sections(robot, args)
     motion, holdout = read_bags(args, robot, progress) if args.bags else ([], None)
     check_workers(workers, robot, motion)
 
@@ -122,13 +116,42 @@ def _read(
     return given, KindsRecordings(() if holdout is None else (holdout,), **others)
 
 
-def _shaken_origin(given: KindsRecordings) -> dict[str, Any]:
-    each = [{"path": signals.path, "sha256": signals.sha256} for signals, _ in given.shaken]
-    return {"frequency": each} if each else {}
+def _must_have_sections(robot: Robot, args: argparse.Namespace) -> None:
+    """What the robot file must say of the kinds that are given, before hours are read.
+
+    Raises:
+        RobotError: a section is missing, or the links have no equations.
+    """
+    from jointscope.robots.files.frequency_section import no_frequency
+    from jointscope.robots.files.pose_section import no_poses
+
+    if args.bags or args.rests:
+        robot.need_link_dynamics()
+    if args.frequency and robot.frequency is None:
+        raise RobotError(no_frequency(robot))
+    if args.poses and robot.poses is None:
+        raise RobotError(no_poses(robot))
 
 
-def kinds_json(found: Any) -> dict[str, Any]:
-    """The ranking over all kinds for machines, and the candidates of each kind."""
+def _still_origin(given: KindsRecordings) -> dict[str, Any]:
+    """Recordings without motion, as the origin of a result has them."""
+    counted = {"rests": given.rests, "poses": given.poses}
+    found: dict[str, Any] = {
+        kind: [{"path": one.path, "sha256": one.sha256, "count": len(one)} for one in each]
+        for kind, each in counted.items()
+        if each
+    }
+    shaken = [{"path": signals.path, "sha256": signals.sha256} for signals, _ in given.shaken]
+    return found | ({"frequency": shaken} if shaken else {})
+
+
+def kinds_json(found: Any, arm: Any = None) -> dict[str, Any]:
+    """The ranking over all kinds for machines, and the candidates of each kind.
+
+    Args:
+        found: the diagnosis.
+        arm: its poses and frequency responses with their errors on those held out; None without.
+    """
     by_graph: dict[str, Any] = {}
     if found.motion is not None:
         by_graph["motion"] = found.motion.to_json()
@@ -136,7 +159,7 @@ def kinds_json(found: Any) -> dict[str, Any]:
         by_graph["arm"] = {
             "moved": None if found.arm_base is None else arm_search.moved_json(found.arm_base),
             "candidates": [arm_search.candidate_json(c) for c in found.arm],
-        }
+        } | ({} if arm is None else arm_search.heldout_json(arm))
     if found.rests is not None:
         by_graph["rests"] = rest_search.diagnosis_json(found.rests)
     return {"adequate": found.adequate, "candidates": [_effect(c) for c in found.candidates], "by_graph": by_graph}
