@@ -7,6 +7,7 @@ hang on a differential: both motors turn both links, so no element of that block
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
@@ -58,7 +59,13 @@ def with_matrix(robot: Robot, elements: dict[tuple[int, int], float]) -> Robot:
 
 
 def locked_bench(
-    robot: Robot, seed: int, seconds: float = 20.0, late: float = LATE, give: float = 0.0, path: str = "bench"
+    robot: Robot,
+    seed: int,
+    seconds: float = 20.0,
+    late: float = LATE,
+    give: float = 0.0,
+    path: str = "bench",
+    ropes: Callable[[Array], Array] | None = None,
 ) -> Recording:
     """A recording of slow motion.
 
@@ -69,6 +76,7 @@ def locked_bench(
         late: by which the links' encoders answer [s].
         give: of the ropes, in the motors' coordinates [rad/(N m)].
         path: of the bag.
+        ropes: motors of links, where they are others than those of the robot.
     """
     rng = np.random.default_rng(seed)
     t = np.arange(0.0, seconds, 0.01)
@@ -78,7 +86,7 @@ def locked_bench(
         return np.asarray(sum(a * np.sin(2 * np.pi * f * times[:, None] + p) for a, f, p in zip(*waves, strict=True)))
 
     q = links(t)
-    ropes = biorob_ropes if robot.n == 4 else doggy_ropes
+    ropes = ropes or (biorob_ropes if robot.n == 4 else doggy_ropes)
     motors = ropes(q)
     if give:
         weight = robot.tree.torque(q, 0.0 * q, 0.0 * q)
