@@ -9,7 +9,8 @@ from dataclasses import replace
 import numpy as np
 
 from jointscope.graphs.rest_search.rest_fits import RestFit
-from jointscope.graphs.scoring.columns.hypotheses import EffectHypothesis, deflections_of, hypotheses_of
+from jointscope.graphs.scoring.columns.hypotheses import EffectHypothesis, hypotheses_of
+from jointscope.graphs.starts.spring_knots import deflections_of
 from jointscope.robots.dynamics.at_rest import AT_ONCE, SLIPPING
 from jointscope.robots.effect_kinds.effect import LINK_SIDE
 from jointscope.robots.effect_kinds.joint_torque import JointSignals, JointTorque
