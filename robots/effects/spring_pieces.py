@@ -112,7 +112,7 @@ def _member(pieces: int) -> SpringPieces:
         example={"turn": 0.2, "forward": 0.03, "backward": 0.04}
         | {name: 0.5 + 0.3 * k for k, name in enumerate(knots)},
         card=Card(
-            title=f"spring of {pieces} {'piece' if pieces == 1 else 'pieces'} a side, which always grows",
+            title=f"spring that always grows, knots a side: {pieces}",
             law="tau_c = integral of the slope over d + D (v_link - v_motor), d = q_link - q_motor; slope = K (1 + h), "
             "or K e^h for h < 0, straight between knots: h = 0 just above d = 0, turn just below, forward_k at k/n of "
             f"forward, backward_k at k/n of -backward, the same beyond; n = {pieces}",

@@ -12,6 +12,7 @@ from jointscope.robots.effect_kinds.groups import GROUPS, group_of
 from jointscope.tools.terminal.text_table import text_table
 
 WIDTH = 100
+LONGEST = 30  # characters of null values in the list
 LABEL = 14
 OWNERS = 27  # columns of the list
 SIGNS = {"+": "never negative", "+-": "either sign"}
@@ -86,7 +87,13 @@ def _nulls(effect: Effect) -> str:
         if not p.is_shape:
             stem, _, end = p.name.rpartition("_")
             found.setdefault((f"{stem}_" if stem else p.name, p.null), []).append(end if stem else "")
-    return ", ".join(f"{stem}{'/'.join(ends)} {null:g}" for (stem, null), ends in found.items())
+    text = ", ".join(f"{stem}{'/'.join(ends)} {null:g}" for (stem, null), ends in found.items())
+    nulls = {null for _, null in found}
+    return (
+        f"all {sum(map(len, found.values()))} sizes {nulls.pop():g}"
+        if len(text) > LONGEST and len(nulls) == 1
+        else text
+    )
 
 
 def null_text(p: EffectParameter) -> str:
@@ -99,7 +106,7 @@ def remark_text(p: EffectParameter) -> str:
     remarks = ["a shape"] if p.is_shape else []
     if p.of_range:
         shares = ", ".join(f"{share:g}" for share in p.grid)
-        remarks.append(f"a diagnosis tries {shares} of the largest deflection that way")
+        remarks.append(f"tried at {shares} of the range seen")
     elif len(p.grid) > 1:
         remarks.append(f"a diagnosis tries {len(p.grid)} values, {p.grid[0]:g} to {p.grid[-1]:g}")
     if p.held:
