@@ -43,6 +43,7 @@ FAULTS: tuple[tuple[str, tuple[dict[str, float], dict[str, float]]], ...] = (  #
     ("spring_cubic@joint3", ({"stiffness": 0.3}, {"stiffness": 1.5})),
     ("spring_slack@joint2", ({"forward": 0.05, "backward": 0.0}, {"forward": 0.3, "backward": 0.0})),
     ("encoder_harmonics@joint1.link", ({"cos": 0.003, "sin": 0.0}, {"cos": 0.01, "sin": 0.01})),
+    ("encoder_hysteresis@joint3.link", ({"half_play": 0.0015}, {"half_play": 0.004})),
 )
 
 

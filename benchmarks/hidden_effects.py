@@ -57,6 +57,8 @@ MORE = (
     "bearing_flexibility@joint1:compliance_x=0.0004,compliance_y=0.0003,product_xz=-0.02,product_yz=0.01",
     "encoder_scale@joint2:scale=0.02",
     "encoder_scale@joint3:scale=-0.05",
+    "encoder_hysteresis@joint2:half_play=0.0003",
+    "encoder_hysteresis@joint3:half_play=0.0007",
 )
 # What the recording contains anyway and the model leaves out: changed lines of the robot file.
 LEFT_OUT: Mapping[str, tuple[str, str]] = {

@@ -40,12 +40,9 @@ class DeadZoneEdges:
         values, transmission, layout = robot.values, Transmission.of(robot), robot.layout
         rows, edges = list[Array](), list[tuple[float, float]]()
         S = np.eye(layout.size) if transmission is None else transmission.maps(values)[0]
-        for here in robot.effects:
-            if isinstance(here.effect, JointTorque) and here.effect.gap:
-                sizes, j = [values[here.parameter(name)] for name in here.effect.gap], robot.joints.index(here.owner)
-                if any(sizes):
-                    rows.append(S[layout.joint_q[j]] - S[layout.motor_q[j]])
-                    edges.append((-sizes[0], sizes[-1]))
+        for j, begin, end in dead_zones(robot):
+            rows.append(S[layout.joint_q[j]] - S[layout.motor_q[j]])
+            edges.append((begin, end))
         if not rows or robot.choices.integrator != "simpson":
             return None
         return DeadZoneEdges(np.array(rows).T, np.array(edges).T)
@@ -76,3 +73,14 @@ class DeadZoneEdges:
         short = np.isin(ticks[:-1], known) | np.isin(ticks[1:], known)
         hit = self.met(x[:-1], x[1:]) & ~short
         return (ticks[:-1][hit, None] + np.diff(ticks)[hit, None] * np.arange(1, PARTS) / PARTS).ravel()
+
+
+def dead_zones(robot: Robot) -> list[tuple[int, float, float]]:
+    """Joint whose spring has a dead zone, and where that begins and ends [rad]."""
+    values, found = robot.values, []
+    for here in robot.effects:
+        if isinstance(here.effect, JointTorque) and here.effect.gap:
+            sizes = [values[here.parameter(name)] for name in here.effect.gap]
+            if any(sizes):
+                found.append((robot.joints.index(here.owner), -sizes[0], sizes[-1]))
+    return found

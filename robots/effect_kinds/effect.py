@@ -14,6 +14,7 @@ from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
+    from jointscope.robots.effect_kinds.joint_torque import Memory
     from jointscope.robots.effect_kinds.robot_view import RobotView
 
 OWNER_KINDS = ("joint", "joint_link", "gyro", "link_encoder", "target", "robot")
@@ -129,6 +130,10 @@ class Effect(ABC):
     def parameters_of(self, robot: RobotView, owner: str) -> tuple[EffectParameter, ...]:
         """Parameters of the instance at one owner, in the units of a joint that turns."""
         return self.parameters
+
+    def memory_at(self, robot: RobotView, owner: str) -> Memory | None:
+        """The state of its own that the instance at one owner has; None for none."""
+        return None
 
     def parameters_at(self, robot: RobotView, owner: str) -> tuple[EffectParameter, ...]:
         """The same in the units of the owner."""

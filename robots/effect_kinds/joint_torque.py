@@ -18,6 +18,7 @@ from jointscope.robots.effect_kinds.effect import Effect
 
 if TYPE_CHECKING:
     from jointscope.robots.effect_kinds.effect_at import EffectAt
+    from jointscope.robots.effect_kinds.robot_view import RobotView
 
 GAP_CORNER = 5e-4  # [rad] over which the corners of a dead zone are rounded
 SIDES = ("motor", "link", "spring")
@@ -107,6 +108,10 @@ class JointTorque(Effect):
     def refined(self, coarse: Any, p: Mapping[str, float]) -> dict[str, float]:
         """Values at which the law is that of a coarser member of its family at values p; none where it has none."""
         return {}
+
+    def memory_at(self, robot: RobotView, owner: str) -> Memory | None:
+        """The same at every owner."""
+        return self.memory
 
     def behind(self, effects: Sequence[EffectAt], owner: str) -> tuple[str, ...]:
         """Full names of the sizes of the dead zone that lies before this law at an owner; empty for none."""

@@ -56,8 +56,8 @@ class EncoderPlays:
                 position = (layout.joint_q if on_link else layout.motor_q)[j]
                 encoder = robot.link_encoder if on_link else robot.motor_encoder
                 assert encoder is not None
-                index, corner = layout.memories.index(here.label), CORNER * effect.noise_of(robot, owner)
-                found.append((index, int(position), corner, here.parameter(effect.width), (encoder.name, j)))
+                place, corner = layout.memories.index(here.label), CORNER * effect.noise_of(robot, owner)
+                found.append((place, int(position), corner, here.parameter(effect.width), (encoder.name, j)))
         if not found:
             return None
         index, positions, corners, widths, seats = zip(*found, strict=True)
@@ -67,7 +67,7 @@ class EncoderPlays:
         return EncoderPlays(lags, np.array(positions, np.intp), rows, np.array(corners), widths, seats)
 
     def sizes(self, values: Mapping[str, float]) -> Array:
-        """h of each, shape (k,) [rad], from values by full name."""
+        """Half of each play, shape (k,) [rad], from values by full name."""
         return np.array([values[name] for name in self.widths])
 
     def after(self, x0: Array, x1: Array, h: Array) -> Array:
@@ -133,11 +133,14 @@ def clipped(moved: Array, h: Array | float, corner: Array | float) -> Array:
         h: shape (k,) [rad].
         corner: how far each corner reaches, shape (k,) [rad].
     """
-    return np.asarray(moved - _beyond(moved - h, corner) + _beyond(-moved - h, corner))
+    found = moved - _beyond(moved - h, corner) + _beyond(-moved - h, corner)
+    return np.where(np.asarray(h) == 0.0, 0.0, found)  # not what rounding leaves of it
 
 
 def _clipped_one(moved: float, h: float, corner: float) -> float:
     """The same for one number."""
+    if h == 0.0:
+        return 0.0
     if abs(moved) < h - corner:
         return moved
     upper, lower = moved - h, -moved - h

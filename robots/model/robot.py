@@ -17,8 +17,7 @@ from numpy.typing import NDArray
 
 from jointscope.robots.bodies.rigid_tree import RigidTree
 from jointscope.robots.effect_kinds.effect_at import EffectAt
-from jointscope.robots.effect_kinds.joint_torque import JointTorque, Memory
-from jointscope.robots.effect_kinds.lagging_reading import LaggingReading
+from jointscope.robots.effect_kinds.joint_torque import Memory
 from jointscope.robots.effect_kinds.structure import Structure
 from jointscope.robots.errors import RobotError
 from jointscope.robots.model.structured_tree import bearing_names, with_bearings
@@ -203,13 +202,8 @@ class Robot:
     @property
     def memories(self) -> dict[str, Memory]:
         """States that effects bring along, by the label of the effect, the first memories of the layout."""
-        found = {}
-        for here in self.effects:
-            if isinstance(here.effect, JointTorque) and here.effect.memory is not None:
-                found[here.label] = here.effect.memory
-            elif isinstance(here.effect, LaggingReading):
-                found[here.label] = here.effect.memory_at(self, here.owner)
-        return found
+        found = ((here.label, here.effect.memory_at(self, here.owner)) for here in self.effects)
+        return {label: memory for label, memory in found if memory is not None}
 
     def unit_at(self, owner: str, unit: str) -> str:
         """The unit of a quantity at an owner, where `unit` is that at a joint that turns."""

@@ -32,6 +32,7 @@ Array = NDArray[np.float64]
 LARGEST_RMS = 1.0  # [sigma] of any state
 FAR = 3.0  # [sigma]
 LARGEST_SHARE = 0.01  # of the ticks at which a state may be further away than FAR
+ROUNDS = 2  # of steps divided at edges of dead zones, which move with the states
 PERIOD = 0.05  # [s] gaps between ticks over which the batch states are not interpolated
 
 
@@ -155,18 +156,27 @@ def _near(ticks: Array, at: Array) -> NDArray[np.bool_]:
 def _with_short_reversals(
     problem: BagProblem, x: Array, calibration: Calibration
 ) -> tuple[BagProblem, Array, Calibration]:
-    """The smoothed problem with its steps divided where dry friction turns over, solved again; shapes as in `smooth`.
+    """The smoothed problem with its steps divided, solved again; shapes as in `smooth`.
+
+    They are divided where dry friction turns over, and where springs meet edges of dead zones.
 
     Args:
         problem: smoothed.
         x: its states, shape (m + 1, d).
         calibration: its values; parameters and mountings stay.
     """
-    robot, ticks = problem.robot, problem.timeline.ticks
-    between = times_of_reversals(robot, ticks, x)
-    if not len(between) or robot.choices.integrator != "simpson":
+    robot = problem.robot
+    if robot.choices.integrator != "simpson":
         return problem, x, calibration
-    divided, start = problem.divided_at(between, x)
     hold = (DYNAMICS, *(rotation_block(gyro.name) for gyro in robot.gyros))
-    estimate = solve([divided], Estimate((start,), (calibration,)), hold=hold).estimate
-    return divided, estimate.states[0], estimate.calibrations[0]
+    turning = times_of_reversals(robot, problem.timeline.ticks, x)
+    for _ in range(ROUNDS):
+        edged, start = problem.divided(x, {})
+        known = [times for times in (problem.between, edged.between) if times is not None]
+        between = np.unique(np.concatenate([turning, *known]))
+        if len(between) == (0 if problem.between is None else len(problem.between)):
+            break
+        problem, start = edged.divided_at(between, start)
+        estimate = solve([problem], Estimate((start,), (calibration,)), hold=hold).estimate
+        x, calibration = estimate.states[0], estimate.calibrations[0]
+    return problem, x, calibration

@@ -14,6 +14,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from jointscope.robots.model.encoder_plays import EncoderPlays
 from jointscope.robots.model.robot import Robot
 from jointscope.robots.parts.state_layout import StateLayout
 
@@ -66,6 +67,9 @@ class AugmentedLayout:
         """Units in which deviations of the components are of size one, shape (D,)."""
         scale = np.ones(self.size)
         scale[self.robot.positions], scale[self.robot.velocities] = POSITION, VELOCITY
+        plays = EncoderPlays.of(robot)
+        if plays is not None:
+            scale[plays.lags] = POSITION
         accelerometers = {sensor.name for sensor in robot.accelerometers}
         for name in self.biased:
             scale[self.biases[name]] = ACCELERATION_BIAS if name in accelerometers else BIAS

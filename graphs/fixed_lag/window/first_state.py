@@ -18,6 +18,8 @@ from jointscope.graphs.fixed_lag.window.augmented_layout import AugmentedLayout
 from jointscope.graphs.fixed_lag.window.newest_state import NewestState
 from jointscope.graphs.fixed_lag.window.observation import Observation
 from jointscope.graphs.problem.bag_problem import DEFLECTION_SIGMA
+from jointscope.graphs.problem.dead_zone_edges import dead_zones
+from jointscope.robots.dynamics.carried_weight import CarriedWeight
 from jointscope.robots.dynamics.transmission import joint_angles
 from jointscope.robots.model.lasting_torques import memory_spreads
 from jointscope.robots.model.robot import Robot
@@ -121,6 +123,9 @@ def first_state(
     mean[own.motor_q], mean[own.motor_v] = newest, v
     mean[own.joint_q], mean[own.joint_v] = joint_angles(robot, newest), joint_angles(robot, v)
     variance[own.positions], variance[own.velocities] = DEFLECTION_SIGMA**2, np.max(v_sigma) ** 2
+    if rests:
+        for column, middle, doubt in _in_dead_zones(robot, newest):
+            mean[column], variance[column] = mean[column] + middle, doubt**2
     links = np.arange(own.n_link)
     variance[own.n_link + links] += 0.0 if rests else LINK_VELOCITY**2
     variance[own.motor_q], variance[own.motor_v] = sigma**2 + (v_sigma * since) ** 2, v_sigma**2
@@ -136,6 +141,29 @@ def first_state(
     mean[layout.adapted] = [robot.parameters[name].value for name in layout.parameters]
     variance[layout.adapted] = prior_sigmas(robot, layout.parameters) ** 2
     return now, NewestState(mean, np.diag(variance))
+
+
+def _in_dead_zones(robot: Robot, q: Array) -> list[tuple[int, float, float]]:
+    """Column of each link that rests on a spring with a dead zone, how far that turns it at rest, and its doubt [rad].
+
+    It lies anywhere in the zone, and beyond it by what it weighs. A prior that is wider by far would be a certainty on
+    the wrong side soon: an estimator that is linear learns from a spring's slope, and within the zone there is none.
+    """
+    zones = dead_zones(robot)
+    if not zones:
+        return []
+    x = np.zeros((1, robot.layout.size))
+    x[:, robot.layout.motor_q] = q
+    x[:, robot.layout.joint_q] = joint_angles(robot, q)
+    weight = CarriedWeight(robot).torque(x, robot.values)[0]
+    ratio = np.ones(robot.n) if robot.transmission is None else np.diag(robot.transmission)
+    found = []
+    for j, begin, end in zones:
+        stiffness = robot.parameters.get(f"{robot.joints[j]}.stiffness")
+        if stiffness is not None:  # a spring that came as an effect has a compliance
+            doubt = float(np.hypot(0.5 * (end - begin), weight[j] / stiffness.value))
+            found.append((int(robot.layout.joint_q[j]), ratio[j] * 0.5 * (begin + end), abs(ratio[j]) * doubt))
+    return found
 
 
 def _velocity(t: Array, q: Array, sigma: float) -> tuple[float, float]:

@@ -128,3 +128,21 @@ def test_a_gyro_shows_its_scale_and_the_drift_of_its_bias():
     expected = (stream.values - bias) * [0.1, -0.2, 0.0] + np.outer(stream.times, [0.1, 0.0, -0.3])
     assert np.abs(change - expected).max() < 5 * 0.2 * DOGGY.gyros[1].sigma  # the noise is not scaled
     np.testing.assert_array_equal(wrong.recording.streams["imu1"].values, plain.recording.streams["imu1"].values)
+
+
+@pytest.mark.parametrize(("robot", "owner"), [("doggy", "joint2"), ("biorob", "joint3.link")])
+def test_play_of_an_encoder_holds_its_reading_until_its_end_pushes(robot, owner):
+    arm, half = load_robot(robot), 4e-3
+    simulation = simulate(arm, "moves", 2.5, 5, effects=[f"encoder_hysteresis@{owner}:half_play={half}"], quantized=False)
+    on_link, joint = owner.endswith(".link"), arm.joints.index(owner.removesuffix(".link"))
+    stream = simulation.recording.streams["link_encoder" if on_link else "motor_encoder"]
+    q = simulation.states[:, joint if on_link else 2 * arm.n + joint]
+    behind = np.interp(stream.times, simulation.state_times, q) - stream.values[:, joint]
+    slow, magnet = np.empty(len(q)), q[0]
+    for k, shaft in enumerate(q):
+        magnet = min(max(magnet, shaft - half), shaft + half)
+        slow[k] = shaft - magnet
+    expected = np.interp(stream.times, simulation.state_times, slow)
+    sigma = (arm.link_encoder if on_link else arm.motor_encoder).sigmas[joint]
+    assert np.std(behind - expected) < 1.3 * sigma
+    assert np.ptp(expected) > 1.9 * half

@@ -1,0 +1,28 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Robots with gaps, in a drive or in a sensor: the estimator ends up where the batch smoother does."""
+
+from __future__ import annotations
+
+import pytest
+
+import jointscope as js
+from jointscope.graphs.fixed_lag.replay.batch_agreement import batch_agreement
+from jointscope.graphs.fixed_lag.replay.replay import replay
+from jointscope.robots.files.effect_editing import add_effect
+from jointscope.robots.files.robot_file import load_robot
+
+pytest.importorskip("mujoco", reason="the simulator needs the extra jointscope[sim]")
+pytestmark = pytest.mark.slow
+
+
+@pytest.mark.parametrize("fault", ["backlash@joint1:half_gap=0.01", "encoder_hysteresis@joint2:half_play=4e-4"])
+def test_states_at_the_lag_agree_with_the_batch_from_a_rest_within_the_gap(fault):
+    doggy = load_robot("doggy")
+    train, moves = (
+        js.simulate("doggy", motion=motion, seconds=seconds, seed=5, effects=[fault]).recording
+        for motion, seconds in (("calibration", 6.0), ("moves", 3.0))
+    )
+    robot = js.calibrate(add_effect(doggy, fault.split(":")[0]), train).robot
+    lagged = replay(robot, moves, 0.1).lagged
+    found = batch_agreement(robot, moves, lagged.times, lagged.mean, lagged.sigma)
+    assert found.apart == {} and found.agrees
