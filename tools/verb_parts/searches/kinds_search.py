@@ -135,7 +135,7 @@ def _must_have_sections(robot: Robot, args: argparse.Namespace) -> None:
 
 def _still_origin(given: KindsRecordings) -> dict[str, Any]:
     """Recordings without motion, as the origin of a result has them."""
-    counted = {"rests": given.rests, "poses": given.poses}
+    counted: dict[str, Sequence[Any]] = {"rests": given.rests, "poses": given.poses}
     found: dict[str, Any] = {
         kind: [{"path": one.path, "sha256": one.sha256, "count": len(one)} for one in each]
         for kind, each in counted.items()
