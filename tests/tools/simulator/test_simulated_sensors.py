@@ -133,7 +133,9 @@ def test_a_gyro_shows_its_scale_and_the_drift_of_its_bias():
 @pytest.mark.parametrize(("robot", "owner"), [("doggy", "joint2"), ("biorob", "joint3.link")])
 def test_play_of_an_encoder_holds_its_reading_until_its_end_pushes(robot, owner):
     arm, half = load_robot(robot), 4e-3
-    simulation = simulate(arm, "moves", 2.5, 5, effects=[f"encoder_hysteresis@{owner}:half_play={half}"], quantized=False)
+    simulation = simulate(
+        arm, "moves", 2.5, 5, effects=[f"encoder_hysteresis@{owner}:half_play={half}"], quantized=False
+    )
     on_link, joint = owner.endswith(".link"), arm.joints.index(owner.removesuffix(".link"))
     stream = simulation.recording.streams["link_encoder" if on_link else "motor_encoder"]
     q = simulation.states[:, joint if on_link else 2 * arm.n + joint]
