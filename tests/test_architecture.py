@@ -14,7 +14,8 @@ FLOORS = ("robots", "factors", "graphs", "tools")
 MODULES = sorted(path for floor in FLOORS for path in (ROOT / floor).rglob("*.py"))
 ROOMS = """
 robots robots.urdf robots.bodies robots.parts robots.effect_kinds robots.model robots.geometry robots.effects
-robots.dynamics robots.recordings robots.rests robots.files robots.ready
+robots.dynamics robots.recordings robots.rests robots.files.sections robots.files
+robots.ready
 factors
 graphs.kernels graphs.problem graphs.solving graphs.workers graphs.spread graphs.gtsam_solvers graphs.noise
 graphs.starts graphs.screening graphs.locked_springs graphs.scoring.columns

@@ -24,7 +24,7 @@ from jointscope.graphs.frequency.agreement import Agreement, agreement
 from jointscope.graphs.frequency.frequency_set import FrequencySet
 from jointscope.graphs.frequency.frequency_summary import FrequencySummary
 from jointscope.graphs.responses.neighbouring_lines import over_neighbours
-from jointscope.robots.files.frequency_section import COULOMB
+from jointscope.robots.files.sections.frequency_section import COULOMB
 from jointscope.robots.model.robot import Robot
 
 Array = NDArray[np.float64]

@@ -28,7 +28,7 @@ from numpy.typing import NDArray
 from jointscope.factors.calibration import DYNAMICS, Calibration
 from jointscope.graphs.frequency.frequency_set import FrequencySet
 from jointscope.graphs.solving.normal_equations import NormalEquations
-from jointscope.robots.files.frequency_section import COULOMB
+from jointscope.robots.files.sections.frequency_section import COULOMB
 from jointscope.robots.model.robot import SHARPNESS, Robot
 
 Array = NDArray[np.float64]

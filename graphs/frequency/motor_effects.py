@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 from scipy.fft import next_fast_len
 
 from jointscope.graphs.frequency.shaken_pose import ShakenPose
-from jointscope.robots.files.frequency_section import VISCOUS
+from jointscope.robots.files.sections.frequency_section import VISCOUS
 from jointscope.robots.geometry.error_parameters import (
     CUBIC,
     LOAD_FRICTION,

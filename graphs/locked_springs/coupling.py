@@ -18,7 +18,7 @@ from jointscope.graphs.screening.transmission_evidence import stated_matrix
 from jointscope.robots.dynamics.transmission import elements
 from jointscope.robots.effect_kinds.transmission_elements import FROM
 from jointscope.robots.errors import RecordingError
-from jointscope.robots.files.transmission_section import WORST_CONDITION, element_units
+from jointscope.robots.files.sections.transmission_section import WORST_CONDITION, element_units
 from jointscope.robots.model.command_words import robot_argument
 from jointscope.robots.model.robot import Robot
 from jointscope.robots.parts.parameter import Parameter

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from jointscope.graphs.poses.what_gives_way import WhatGivesWay
 from jointscope.robots.bodies.misplaced_joints import ANGLES, LENGTHS
 from jointscope.robots.errors import RobotError
-from jointscope.robots.files.pose_section import no_poses
+from jointscope.robots.files.sections.pose_section import no_poses
 from jointscope.robots.geometry.arm_chain import ArmChain, ChainPoint
 from jointscope.robots.geometry.arm_effects import DRIFT, joints_misread
 from jointscope.robots.geometry.error_parameters import TOOL, TRACKER

@@ -21,7 +21,7 @@ from jointscope.graphs.screening.transmission_evidence import (
     stated_matrix,
 )
 from jointscope.robots.dynamics.transmission import elements
-from jointscope.robots.files.transmission_section import WORST_CONDITION
+from jointscope.robots.files.sections.transmission_section import WORST_CONDITION
 from jointscope.robots.model.command_words import robot_argument
 from jointscope.robots.model.robot import Robot
 from jointscope.robots.recordings.motor_zero import with_motor_zero

@@ -16,7 +16,12 @@ from jointscope.robots.effect_kinds.structure import Structure
 from jointscope.robots.errors import EffectError
 from jointscope.robots.files.effect_catalogue import catalogue, parse_effect, without_alias
 from jointscope.robots.files.needed_spring import effects_of_spring, is_spring, needed_spring
-from jointscope.robots.files.noise_section import HINGE_DENSITY, HINGE_LASTING, smallest_densities, unseen_links
+from jointscope.robots.files.sections.noise_section import (
+    HINGE_DENSITY,
+    HINGE_LASTING,
+    smallest_densities,
+    unseen_links,
+)
 from jointscope.robots.files.yaml_comments import empty_at, remove_at
 from jointscope.robots.model.command_words import edited_argument, robot_argument
 from jointscope.robots.model.robot import Robot

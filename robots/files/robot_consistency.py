@@ -4,10 +4,10 @@
 from __future__ import annotations
 
 from jointscope.robots.errors import RobotError
-from jointscope.robots.files.frequency_section import check_frequency, frequency_units
 from jointscope.robots.files.needed_spring import needed_spring
+from jointscope.robots.files.sections.frequency_section import check_frequency, frequency_units
+from jointscope.robots.files.sections.transmission_section import check_transmission, element_units
 from jointscope.robots.files.spring_section import check_curves
-from jointscope.robots.files.transmission_section import check_transmission, element_units
 from jointscope.robots.geometry.arm_effects import effect_units
 from jointscope.robots.geometry.error_parameters import pose_units
 from jointscope.robots.model.command_words import edited_argument, robot_argument

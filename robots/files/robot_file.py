@@ -17,15 +17,15 @@ import numpy as np
 from jointscope.robots.bodies.rigid_tree import RigidTree
 from jointscope.robots.effect_kinds.effect_at import EffectAt
 from jointscope.robots.errors import EffectError, RobotError
-from jointscope.robots.files.derived_section import derived_results
 from jointscope.robots.files.effect_catalogue import parse_effect
-from jointscope.robots.files.frequency_section import check_still_parameters, frequency_setup
-from jointscope.robots.files.locked_section import check_locked_springs
-from jointscope.robots.files.noise_section import noise_of, process_noise
-from jointscope.robots.files.pose_section import pose_setup, with_poses
 from jointscope.robots.files.robot_consistency import check_robot
-from jointscope.robots.files.sensor_sections import sensor, topic
-from jointscope.robots.files.transmission_section import transmission_matrix
+from jointscope.robots.files.sections.derived_section import derived_results
+from jointscope.robots.files.sections.frequency_section import check_still_parameters, frequency_setup
+from jointscope.robots.files.sections.locked_section import check_locked_springs
+from jointscope.robots.files.sections.noise_section import noise_of, process_noise
+from jointscope.robots.files.sections.pose_section import pose_setup, with_poses
+from jointscope.robots.files.sections.sensor_sections import sensor, topic
+from jointscope.robots.files.sections.transmission_section import transmission_matrix
 from jointscope.robots.model.command_words import READY_ROOT, ready_robots
 from jointscope.robots.model.robot import Robot
 from jointscope.robots.model.tracker_frames import with_trackers

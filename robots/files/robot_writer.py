@@ -11,9 +11,9 @@ from typing import Any
 import numpy as np
 from ruamel.yaml.comments import CommentedMap, CommentedSeq
 
-from jointscope.robots.files.pose_section import write_tracker
 from jointscope.robots.files.robot_file import urdf_reference
-from jointscope.robots.files.transmission_section import write_transmission
+from jointscope.robots.files.sections.pose_section import write_tracker
+from jointscope.robots.files.sections.transmission_section import write_transmission
 from jointscope.robots.model.lasting_torques import lasting_torques
 from jointscope.robots.model.robot import Robot
 from jointscope.robots.parts.parameter import Parameter

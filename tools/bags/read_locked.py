@@ -9,7 +9,7 @@ from pathlib import Path
 
 from jointscope.graphs.locked_springs.coupling import Coupling, find_coupling
 from jointscope.graphs.locked_springs.locked_readings import LockedReadings
-from jointscope.robots.files.locked_section import locked_in
+from jointscope.robots.files.sections.locked_section import locked_in
 from jointscope.robots.model.robot import Robot
 from jointscope.robots.recordings.recording import must_count_once
 from jointscope.tools.bags.read_recording import read_recording

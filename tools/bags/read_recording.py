@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from jointscope.graphs.starts.end_stops import EndStop, end_stops
 from jointscope.robots.errors import RecordingError
-from jointscope.robots.files.locked_section import names_recording, no_motion_text
+from jointscope.robots.files.sections.locked_section import names_recording, no_motion_text
 from jointscope.robots.model.robot import Robot
 from jointscope.robots.parts.sensors import LinkEncoder, MotorEncoder
 from jointscope.robots.recordings.recording import Notice, Recording, Stream

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from jointscope.robots.errors import RobotError, SimulationError
-from jointscope.robots.files.frequency_section import no_frequency
+from jointscope.robots.files.sections.frequency_section import no_frequency
 from jointscope.robots.model.robot import Robot
 from jointscope.robots.recordings.signals import Excitation, Signal, Signals
 from jointscope.tools.simulator.arm.arm_bodies import true_values

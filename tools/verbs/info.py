@@ -52,8 +52,8 @@ def run(args: argparse.Namespace) -> int:
     load_user_effects(args.effects)
     robot, locked = None, False
     if args.robot:
-        from jointscope.robots.files.locked_section import names_recording
         from jointscope.robots.files.robot_file import load_robot  # the equations of motion behind it cost time
+        from jointscope.robots.files.sections.locked_section import names_recording
 
         robot = load_robot(args.robot)
         locked = args.locked_springs or names_recording(robot, args.bag)

@@ -18,8 +18,8 @@ from jointscope.graphs.poses.pose_set import PoseSet
 from jointscope.graphs.poses.tip_errors import tip_errors, without_sag
 from jointscope.graphs.poses.tracker_start import placed
 from jointscope.robots.errors import RecordingError
-from jointscope.robots.files.pose_section import with_poses
 from jointscope.robots.files.robot_file import load_robot
+from jointscope.robots.files.sections.pose_section import with_poses
 from jointscope.robots.parts.parameter import Parameter
 from jointscope.tools.verdicts.pose_judgement import judge_poses
 

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from jointscope.robots.errors import RecordingError, RobotError
-from jointscope.robots.files.pose_section import no_poses
+from jointscope.robots.files.sections.pose_section import no_poses
 from jointscope.robots.model.robot import Robot
 from jointscope.robots.recordings.poses import Poses
 from jointscope.robots.recordings.recording import Notice

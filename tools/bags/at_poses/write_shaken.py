@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from jointscope.robots.errors import RobotError
-from jointscope.robots.files.frequency_section import no_frequency
+from jointscope.robots.files.sections.frequency_section import no_frequency
 from jointscope.robots.model.robot import Robot
 from jointscope.robots.parts.sensors import Topic
 from jointscope.robots.recordings.excitation_file import FILE

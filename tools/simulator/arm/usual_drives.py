@@ -12,7 +12,7 @@ from dataclasses import replace
 import numpy as np
 
 from jointscope.robots.errors import SimulationError
-from jointscope.robots.files.frequency_section import INERTIA, POSITIONS, TORQUES
+from jointscope.robots.files.sections.frequency_section import INERTIA, POSITIONS, TORQUES
 from jointscope.robots.geometry.error_parameters import BEARING, DAMPING, STIFFNESS, TILT_DAMPING
 from jointscope.robots.model.robot import Robot
 from jointscope.robots.parts.frequency_setup import FrequencySetup

@@ -122,8 +122,8 @@ def _must_have_sections(robot: Robot, args: argparse.Namespace) -> None:
     Raises:
         RobotError: a section is missing, or the links have no equations.
     """
-    from jointscope.robots.files.frequency_section import no_frequency
-    from jointscope.robots.files.pose_section import no_poses
+    from jointscope.robots.files.sections.frequency_section import no_frequency
+    from jointscope.robots.files.sections.pose_section import no_poses
 
     if args.bags or args.rests:
         robot.need_link_dynamics()

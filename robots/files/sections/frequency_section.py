@@ -6,7 +6,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from jointscope.robots.errors import RobotError
-from jointscope.robots.files.sensor_sections import topic_or_usual
+from jointscope.robots.files.sections.sensor_sections import topic_or_usual
 from jointscope.robots.geometry.arm_effects import effect_units
 from jointscope.robots.geometry.error_parameters import BEARING, DAMPING, STIFFNESS, TILT_DAMPING, pose_units
 from jointscope.robots.model.robot import SHARPNESS, Robot

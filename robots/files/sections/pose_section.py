@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from jointscope.robots.bodies.misplaced_joints import LENGTHS
 from jointscope.robots.bodies.rigid_tree import RigidTree
 from jointscope.robots.errors import RobotError
-from jointscope.robots.files.sensor_sections import topic_or_usual
+from jointscope.robots.files.sections.sensor_sections import topic_or_usual
 from jointscope.robots.geometry.arm_chain import ArmChain
 from jointscope.robots.geometry.error_parameters import TOOL, TRACKER, error_parameters
 from jointscope.robots.geometry.rotations import of_quaternions, quaternion_xyzw
