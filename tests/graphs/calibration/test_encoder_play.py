@@ -18,21 +18,17 @@ pytestmark = pytest.mark.slow
     ("robot", "owner", "half", "seconds"),
     [("doggy", "joint2", 4e-4, 8.0), ("biorob", "joint3.link", 2e-3, 6.0)],  # five or six sigmas of the encoder
 )
-def test_the_play_is_found_with_an_honest_sigma_and_predictions_are_those_of_an_arm_without(
-    robot, owner, half, seconds
-):
+def test_the_play_is_found_with_an_honest_sigma_and_predictions_are_those_of_its_true_size(robot, owner, half, seconds):
     label = f"encoder_hysteresis@{owner}"
-    faulty, sound = (
-        [
-            js.simulate(robot, motion=motion, seconds=t, seed=3, effects=effects).recording
-            for motion, t in (("calibration", seconds), ("moves", 3.0))
-        ]
-        for effects in ([f"{label}:half_play={half}"], [])
+    train, moves = (
+        js.simulate(robot, motion=motion, seconds=t, seed=3, effects=[f"{label}:half_play={half}"]).recording
+        for motion, t in (("calibration", seconds), ("moves", 3.0))
     )
     arm = load_robot(robot)
-    found = js.calibrate(add_effect(arm, label), faulty[0]).robot
+    found = js.calibrate(add_effect(arm, label), train).robot
     play = found.parameters[f"{owner}.encoder_hysteresis.half_play"]
     assert abs(play.value - half) < 3.0 * play.sigma
     assert abs(play.value - half) < 0.1 * half
-    best = heldout_error(js.calibrate(arm, sound[0]).robot, sound[1])
-    assert heldout_error(found, faulty[1]) < 1.1 * best
+    error = heldout_error(found, moves)
+    assert error < 1.1 * heldout_error(found.with_values({play.name: half}), moves)
+    assert error < 0.9 * heldout_error(js.calibrate(arm, train).robot, moves)
