@@ -40,12 +40,11 @@ def test_what_does_not_go_together_is_refused_in_one_line(options, text, tmp_pat
     assert text in said and len(said.strip().splitlines()) == 1
 
 
-@pytest.mark.parametrize("given", [[SPRING1, "--rests", SPRING3], ["--rests", SPRING3, "--poses", "poses.csv"]])
-def test_a_model_grows_by_one_graph_and_all_kinds_are_asked_by_diagnose(given, tmp_path, capsys):
-    assert main(["discover", "biorob", *map(str, given), "-o", str(tmp_path / "o.yaml")]) == 1
-    assert (
-        "`jointscope diagnose` takes all of them and says which kind shows what is missing" in capsys.readouterr().err
-    )
+def test_a_kind_that_the_robot_file_does_not_describe_is_told_before_anything_is_read(tmp_path, capsys):
+    given = ["--rests", str(SPRING3), "--poses", "poses.csv", "-o", str(tmp_path / "o.yaml")]
+    assert main(["discover", "biorob", *given]) == 1
+    said = capsys.readouterr().err
+    assert "biorob.yaml has no section `poses`" in said and said.count("\n") == 1
 
 
 def test_limits_go_with_calibrate_and_compare(tmp_path, capsys):
