@@ -133,6 +133,7 @@ def test_springs_of_pieces_and_with_strings_are_not_bent_farther_than_they_were(
         whole = RestSet.of(each, small)
         calibration = Calibration.of(each).only([DYNAMICS])
         known = np.eye(len(calibration.names)) * 1e-4
-        rows = candidate_rows(whole, calibration, known, states, tried, np.tile([12.0, 0.0, 0.0], (13, 1)), ("hook",) * 13)
+        pulls = np.tile([12.0, 0.0, 0.0], (13, 1))
+        rows = candidate_rows(whole, calibration, known, states, tried, pulls, ("hook",) * 13)
         counts.append(np.count_nonzero(np.any(rows != 0.0, axis=(1, 2))))
     assert counts[0] < counts[1]
