@@ -26,6 +26,7 @@ from jointscope.graphs.rests.rest_set import RestSet
 from jointscope.graphs.rests.rests_beside_motion import with_rests
 from jointscope.graphs.solving.batch_solver import Progress, Solver, solve
 from jointscope.graphs.solving.set_problem import SetProblem
+from jointscope.graphs.starts.spring_knots import with_knots
 from jointscope.robots.geometry.arm_effects import FREQUENCY, POSES
 from jointscope.robots.model.robot import Robot
 from jointscope.robots.rests.rests import Rests
@@ -69,6 +70,7 @@ def calibrate_shared(
         still = calibrate_with_rests(robot, given.rests, given.poses, given.shaken, report)
         return SharedModel(still.robot, None, still, still.poses, still.rests.problems)
     poses, at_rest = None, list[RestSet]()
+    robot = with_knots(robot, [*given.motion, *given.rests])
     if given.poses:
         poses = calibrate_poses(robot, given.poses, report)
         robot = _placed(robot, poses)

@@ -3,7 +3,8 @@
 
 The model alone answers to the goals, from the first measured position at rest to the end of the recording; its errors
 add up, but the controller holds them down as it does in the robot. Runge-Kutta of order 4; the controller acts at every
-step. A drive that is switched off (goal NaN) is an open bridge: no torque, and no back-EMF either.
+step, and reads the encoders with their errors. A drive that is switched off (goal NaN) is an open bridge: no torque,
+and no back-EMF either.
 """
 
 from __future__ import annotations
@@ -18,6 +19,7 @@ from jointscope.robots.dynamics.state_rates import StateRates
 from jointscope.robots.dynamics.transmission import joint_angles
 from jointscope.robots.effect_kinds.command_effect import CommandEffect
 from jointscope.robots.errors import RecordingError, RobotError
+from jointscope.robots.model.readings_at_one_state import ReadingsAtOneState
 from jointscope.robots.model.robot import Robot
 from jointscope.robots.recordings.controller_gain import controller_of
 from jointscope.robots.recordings.recording import Recording, Stream
@@ -83,7 +85,7 @@ def free_run(robot: Robot, recording: Recording) -> FreeRun:
         )
     encoder, zero = recording.streams[robot.motor_encoder.name], robot.motor_encoder.zero
     on, off = _Stepper(robot), _Stepper(_without_back_emf(robot))
-    layout = robot.layout
+    layout, sensors = robot.layout, ReadingsAtOneState(robot)
     at_rest = np.zeros((1, len(robot.joints)))
     first = encoder.values[:1] - zero
     joints = np.hstack([joint_angles(robot, first), at_rest, first, at_rest])
@@ -96,12 +98,13 @@ def free_run(robot: Robot, recording: Recording) -> FreeRun:
     for k in range(len(times)):
         if k in restarts:  # what happened in a stretch that is left out is not the model's
             x = layout.from_joints(_measured(robot, encoder, float(times[k])))[0]
-        positions[k] = x[layout.motor_q] + zero
+        positions[k] = sensors.read(robot.motor_encoder.name, x, float(times[k]))[0]
         command = controller.command(wanted[k], positions[k])
         # one bridge for all joints that are off: their back-EMF goes together
         x = (on if np.isfinite(wanted[k]).all() else off).step(x, command)
     judged = recording.are_judged(encoder.times)
     stamps, measured = encoder.times[judged], encoder.measured[judged]
+    positions = np.where(np.isnan(positions), np.inf, positions)  # a model that ran away is no sample that is missing
     simulated = np.column_stack([np.interp(stamps, times, column) for column in positions.T])
     return FreeRun(encoder.channels, stamps, simulated, measured)
 
@@ -129,9 +132,11 @@ class _Stepper:
 
     def step(self, x: Array, u: Array) -> Array:
         """The state one step later, shape (d,)."""
-        h, torque = STEP / self._cuts.fine, self._rates.command_torque(u)
+        h, torque, before, plays = STEP / self._cuts.fine, self._rates.command_torque(u), x, self._rates.plays
         for _ in range(self._cuts.fine):
             x = runge_kutta(lambda at: self._rates.rates(at, torque), x, h)
+        if plays is not None:
+            x[plays.lags] = plays.after(before, x, self._rates.play_sizes)
         return x
 
 

@@ -39,6 +39,7 @@ from jointscope.graphs.rests.unnoticed import unnoticed
 from jointscope.graphs.solving.batch_solver import Progress, Solution
 from jointscope.graphs.solving.set_problem import SetProblem
 from jointscope.graphs.solving.solver_context import in_solver_context
+from jointscope.graphs.starts.spring_knots import with_knots
 from jointscope.robots.errors import RecordingError
 from jointscope.robots.model.robot import Robot
 from jointscope.robots.parts.parameter import with_sigmas
@@ -106,7 +107,7 @@ def calibrate_with_rests(
     began, report = time.perf_counter(), progress or (lambda text, share: None)
     others = _without_rests(robot, sessions, shaken, report)
     poses = poses_of(others)
-    placed = robot if poses is None else poses.problems[0].robot
+    placed = with_knots(robot if poses is None else poses.problems[0].robot, rests)
     alone = calibrate_rests(placed, rests, lambda text, share: report(text, 0.8))
     near = _with_values_of(placed, alone.likeliest, [p.name for p in alone.parameters])
     near = _with_values_of(near, others.robot, told_by(others))

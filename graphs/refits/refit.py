@@ -220,10 +220,15 @@ def _curve_beyond(base: BaseModel, here: EffectAt, gap: tuple[float, ...]) -> di
     for curve in curves:
         assert isinstance(curve.effect, JointTorque)
         law, own = curve.effect.law, curve.own(values)
+        if curve.effect.curve != "terms":  # knots and lengths stay; what such a law has by the stiffness follows it
+            beside, beyond = (np.real(law(_signals(d, k, gap), own)) for k in (0.0, 1.0))
+            before = before + np.real(law(_signals(d, values[stiffness]), own)) - beside
+            columns[0] = columns[0] + beyond - beside
+            continue
         before = before + np.real(law(_signals(d), own))
         nothing = dict.fromkeys(own, 0.0)
         for name in own:
-            slope = law(replace(_signals(d), gap=gap), {**nothing, name: 1j * STEP})
+            slope = law(_signals(d, gap=gap), {**nothing, name: 1j * STEP})
             names.append(curve.parameter(name))
             columns.append(np.imag(slope) / STEP)
             sigmas.append(robot.parameters[names[-1]].prior_sigma)
@@ -241,7 +246,7 @@ def _deflection(robot: Robot, values: dict[str, float], x: Array, joint: str) ->
     return np.asarray(seen[:, layout.joint_q[j]] - seen[:, layout.motor_q[j]])
 
 
-def _signals(d: Array) -> JointSignals:
+def _signals(d: Array, stiffness: float = 0.0, gap: tuple[float, ...] | None = None) -> JointSignals:
     """A spring that is bent and at rest."""
     still = np.zeros_like(d)
-    return JointSignals(d, still, still, still, still, 0.0)
+    return JointSignals(d, still, still, still, still, stiffness, gap=gap)

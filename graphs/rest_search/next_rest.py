@@ -35,7 +35,7 @@ ASKED, TOLD = 15, 3  # values that are tried, the least known first, and that ar
 HELPS = 0.85  # times its sigma that a value must have after ten such rests
 AS_GOOD = 1.25  # times the sigma that a posture nearer to the usual one may leave
 REPEATS = 10
-MASS, SPRING, CURVE = ".link_mass.", ".stiffness", ".spring_curve."
+MASS, SPRING, CURVE = ".link_mass.", ".stiffness", ".spring_"
 
 
 @dataclass(frozen=True)

@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from jointscope.factors.calibration import Calibration
 from jointscope.graphs.rests.rest_set import RestSet
 from jointscope.robots.dynamics.transmission import motor_angles
+from jointscope.robots.effect_kinds.joint_torque import JointTorque
 from jointscope.robots.rests.rests import Rests
 
 Array = NDArray[np.float64]
@@ -27,7 +28,6 @@ STEP = np.radians(5.0)  # of angles that are advised
 WIDER = 0.25  # of the range that was seen, that it may be left by at both ends where a joint has no limits
 WIDEST = 4.0 * np.pi  # [rad or m] between limits that are any
 REACHED = 1.1  # times the largest command and deflection of the rests
-BENT = ("spring_curve", "spring_cubic", "spring_slack", "backlash")  # effects of springs that are no straight line
 NEWTON, SETTLED = 30, 1e-6  # steps to equilibrium, and what may be left of the torques
 CHUNK = 250  # candidates at once
 
@@ -130,12 +130,17 @@ def _standing(problem: RestSet, calibration: Calibration, had: Rests, seen: Arra
         possible &= np.all(np.abs(found.links.value) < 1e3 * SETTLED * scale, axis=1)
     if len(seen) and inner:
         motors = problem.places(layout.motor_q)
-        bent = {here.owner for here in robot.effects if here.effect.id in BENT}
+        bent = {here.owner for here in robot.effects if isinstance(here.effect, JointTorque) and _is_bent(here.effect)}
         some = np.array([joint in bent for joint in robot.joints])
         far = np.abs(motor_angles(robot, seen[:, joints]) - seen[:, motors]).max(axis=0)
         within = np.abs(motor_angles(robot, x[:, joints]) - x[:, motors]) <= REACHED * far
         possible &= np.all(within | ~some, axis=1)
     return x, u, possible
+
+
+def _is_bent(effect: JointTorque) -> bool:
+    """Whether a law makes a spring no straight line."""
+    return effect.side == "spring" and effect.memory is None
 
 
 def _strongest(problem: RestSet, gain: Array, had: Rests) -> Array:

@@ -19,7 +19,7 @@ from jointscope.robots.recordings.recording import Recording
 from jointscope.robots.rests.rests import Rests
 
 Array = NDArray[np.float64]
-Pair = tuple[Array, Array]  # positions of motors and links as encoders read them, shape (m, n) each
+Pair = tuple[Array, Array]  # positions of motors and links, zeros of their encoders taken off, shape (m, n) each
 LEAST = 0.1  # share of the larger side that each side of a range has at least
 
 
@@ -66,16 +66,18 @@ def deflections_of(robot: Robot, seen: Iterable[Array]) -> dict[str, dict[str, f
 
 
 def _pair(robot: Robot, recording: Recording | Rests) -> Pair | None:
-    """What encoders read at the same times; None without encoders on the links."""
+    """What encoders read at the same times, but in stretches left out; None without encoders on the links."""
     if isinstance(recording, Rests):
         return None if recording.q_link is None else (recording.q_motor, recording.q_link)
     if robot.link_encoder is None:
         return None
     motor, link = (recording.streams[sensor.name] for sensor in (robot.motor_encoder, robot.link_encoder))
-    inside = (motor.times >= link.times[0]) & (motor.times <= link.times[-1])
+    inside = (motor.times >= link.times[0]) & (motor.times <= link.times[-1]) & recording.are_judged(motor.times)
+    if not np.any(inside):
+        return None
     times = motor.times[inside]
     q_link = np.column_stack([np.interp(times, link.times, column) for column in link.values.T])
-    return motor.values[inside], q_link
+    return motor.values[inside] - robot.motor_encoder.zero, q_link - robot.link_encoder.zero
 
 
 def _seen(robot: Robot, q_motor: Array, q_link: Array) -> Array:

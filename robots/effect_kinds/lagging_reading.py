@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 START = 3.0  # [sigma of the encoder] where a calibration begins
 CREEP = 1.0  # [sigma of the encoder/sqrt(s)] by which the lag may move of itself; with less, solvers stick at corners
-WIDEST = 10.0  # [sigma] by which the lag may be off where a recording begins
+WIDEST = 10.0  # [sigma] by which the lag may be off where a recording begins, where its play is not known to be wider
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -47,7 +47,8 @@ class LaggingReading(Effect):
     def memory_at(self, robot: RobotView, owner: str) -> Memory:
         """The lag, with the creep that it may have."""
         sigma = self.noise_of(robot, owner)
-        return Memory(rate=_stands, noise=CREEP * sigma, spread=WIDEST * sigma)
+        half = robot.parameters.get(f"{owner}.{self.id}.{self.width}")
+        return Memory(_stands, CREEP * sigma, max(WIDEST * sigma, 0.0 if half is None else half.value))
 
     @staticmethod
     def noise_of(robot: RobotView, owner: str) -> float:

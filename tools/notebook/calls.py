@@ -105,7 +105,8 @@ def calibrate(
     else:
         report, paths = progress or _quiet, [[Path(path) for path in each] for each in (rests, poses, frequency)]
         placed, at_poses = weighted_poses(model, paths[1], report)
-        all_sets = [*sets, *weighted_rests(placed, paths[0], report), *at_poses]
+        placed, at_rest = weighted_rests(placed, paths[0], read_ones, report)
+        all_sets = [*sets, *at_rest, *at_poses]
         options: dict[str, Any] = {"biases_only": biases_only, "solver": solver, "sets": all_sets, "progress": progress}
         shaken = read_all_shaken(placed, paths[2], report)
         if shaken:

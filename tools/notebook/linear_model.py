@@ -56,7 +56,8 @@ def linear_model(robot: Robot, posture: Mapping[str, float] | None = None) -> Li
 
     Dry friction is left out, as linear feedback cannot know it: a joint that slides has it as a constant torque, one
     that sticks does not answer at all (Ho, Kisner, "Trajectory Tracking Controller for a 4-DoF Flexible Joint Robot
-    Arm", app. B.1). Viscous friction, springs at their load, weight and memories of effects are in.
+    Arm", app. B.1). Viscous friction, springs at their load, weight and memories of effects are in, lags of encoders
+    with play are not: they move no joint, and no feedback moves them but by a whole play.
 
     Args:
         robot: with the values to use, as `calibrate` finds them.
@@ -95,7 +96,11 @@ def linear_model(robot: Robot, posture: Mapping[str, float] | None = None) -> Li
             "and motors can carry"
         )
     gain = rates.command_torque(np.ones(robot.n))
-    return LinearModel(A, by_torque * gain, x, torque / gain, _names(robot))
+    kept = np.arange(layout.size) if rates.plays is None else np.setdiff1d(np.arange(layout.size), rates.plays.lags)
+    names = _names(robot)
+    return LinearModel(
+        A[np.ix_(kept, kept)], by_torque[kept] * gain, x[kept], torque / gain, tuple(names[k] for k in kept)
+    )
 
 
 def _both_ways(rates: StateRates, x: Array, torque: Array) -> tuple[Array, Array, Array]:

@@ -23,6 +23,7 @@ from jointscope.tools.writing.origin import made_from, other_kinds
 
 if TYPE_CHECKING:
     from jointscope.graphs.locked_springs.coupling import Coupling
+    from jointscope.robots.recordings.recording import Recording
 
 
 def check_held_out_rests(args: argparse.Namespace) -> None:
@@ -216,13 +217,21 @@ def _with_rests_json(result: Any) -> dict[str, Any]:
     }
 
 
-def weighted_rests(robot: Robot, paths: Sequence[Path], progress: Progress) -> list[Any]:
-    """Rests for an estimate with motion, each with the weight that it deserves; none without paths."""
-    if not paths:
-        return []
-    from jointscope.graphs.rests.calibrate_rests import settled_rests
+def weighted_rests(
+    robot: Robot, paths: Sequence[Path], motions: Sequence[Recording], progress: Progress
+) -> tuple[Robot, list[Any]]:
+    """Rests for an estimate with motion, each with the weight that it deserves, and the robot; none without paths.
 
-    return list(settled_rests(robot, read_all_rests(paths, robot, progress), progress)[0])
+    Knots of the robot's springs lie where any of the recordings deflects them.
+    """
+    if not paths:
+        return robot, []
+    from jointscope.graphs.rests.calibrate_rests import settled_rests
+    from jointscope.graphs.starts.spring_knots import with_knots
+
+    rests = read_all_rests(paths, robot, progress)
+    robot = with_knots(robot, [*motions, *rests])
+    return robot, list(settled_rests(robot, rests, progress)[0])
 
 
 def compare_rests(robots: Mapping[str, Robot], paths: Sequence[Path], progress: Progress) -> tuple[str, dict[str, Any]]:

@@ -21,6 +21,7 @@ from jointscope.graphs.problem.bag_problem import DEFLECTION_SIGMA
 from jointscope.graphs.problem.dead_zone_edges import dead_zones
 from jointscope.robots.dynamics.carried_weight import CarriedWeight
 from jointscope.robots.dynamics.transmission import joint_angles
+from jointscope.robots.model.encoder_plays import EncoderPlays
 from jointscope.robots.model.lasting_torques import memory_spreads
 from jointscope.robots.model.robot import Robot
 
@@ -123,28 +124,56 @@ def first_state(
     mean[own.motor_q], mean[own.motor_v] = newest, v
     mean[own.joint_q], mean[own.joint_v] = joint_angles(robot, newest), joint_angles(robot, v)
     variance[own.positions], variance[own.velocities] = DEFLECTION_SIGMA**2, np.max(v_sigma) ** 2
-    if rests:
-        for column, middle, doubt in _in_dead_zones(robot, newest):
-            mean[column], variance[column] = mean[column] + middle, doubt**2
     links = np.arange(own.n_link)
     variance[own.n_link + links] += 0.0 if rests else LINK_VELOCITY**2
     variance[own.motor_q], variance[own.motor_v] = sigma**2 + (v_sigma * since) ** 2, v_sigma**2
     variance[own.memory] = memory_spreads(robot) ** 2
+    if walking is None:
+        for sensor in robot.biased:
+            columns = layout.biases[sensor.name]
+            mean[columns], variance[columns] = sensor.bias, sensor.bias_prior_sigma**2
+        mean[layout.adapted] = [robot.parameters[name].value for name in layout.parameters]
+        variance[layout.adapted] = prior_sigmas(robot, layout.parameters) ** 2
+    found = NewestState(mean, np.diag(variance))
     if walking is not None:
         mean[layout.walking] = walking.mean[layout.walking]
-        covariance = np.diag(variance)
-        covariance[layout.walking, layout.walking] = walking.covariance[layout.walking, layout.walking]
-        return now, NewestState(mean, covariance)
-    for sensor in robot.biased:
-        columns = layout.biases[sensor.name]
-        mean[columns], variance[columns] = sensor.bias, sensor.bias_prior_sigma**2
-    mean[layout.adapted] = [robot.parameters[name].value for name in layout.parameters]
-    variance[layout.adapted] = prior_sigmas(robot, layout.parameters) ** 2
-    return now, NewestState(mean, np.diag(variance))
+        found.covariance[layout.walking, layout.walking] = walking.covariance[layout.walking, layout.walking]
+    zones, plays = _in_dead_zones(robot, newest) if rests else [], EncoderPlays.of(robot)
+    if zones or plays is not None:
+        _tie(robot, found, zones, plays)
+    return now, found
+
+
+def _tie(robot: Robot, found: NewestState, zones: list[tuple[int, float, float]], plays: EncoderPlays | None) -> None:
+    """Ties motors to what their encoders lag by, and links to their motors, by q_link = T (q_motor + deflection).
+
+    An encoder with play knows where its reading is; the motor is ahead of it by a lag that nobody has seen.
+
+    Args:
+        robot: its layout and transmission.
+        found: independent positions and lags; changed in place.
+        zones: as `_in_dead_zones` finds them.
+        plays: of its encoders; None for none.
+    """
+    layout, P, mean = robot.layout, found.covariance, found.mean
+    for (sensor, _), lag, q in zip(plays.seats, plays.lags, plays.positions, strict=True) if plays is not None else ():
+        if sensor == robot.motor_encoder.name:
+            P[q, q] += P[lag, lag]
+            P[q, lag] = P[lag, q] = P[lag, lag]
+    middle, doubt = np.zeros(robot.n), np.full(robot.n, DEFLECTION_SIGMA)
+    for j, ahead, unsure in zones:
+        middle[j], doubt[j] = ahead, unsure
+    elastic = list(layout.elastic_joints)
+    T = joint_angles(robot, np.eye(robot.n)).T[np.ix_(elastic, elastic)]
+    links, motors = layout.joint_q[elastic], layout.motor_q[elastic]
+    mean[links] += T @ middle[elastic]
+    of_links = T @ P[motors]
+    P[links], P[:, links] = of_links, of_links.T
+    P[np.ix_(links, links)] = of_links[:, motors] @ T.T + T @ np.diag(doubt[elastic] ** 2) @ T.T
 
 
 def _in_dead_zones(robot: Robot, q: Array) -> list[tuple[int, float, float]]:
-    """Column of each link that rests on a spring with a dead zone, how far that turns it at rest, and its doubt [rad].
+    """Joints that rest on springs with a dead zone, how far their deflection is at rest, and its doubt [rad].
 
     It lies anywhere in the zone, and beyond it by what it weighs. A prior that is wider by far would be a certainty on
     the wrong side soon: an estimator that is linear learns from a spring's slope, and within the zone there is none.
@@ -156,13 +185,12 @@ def _in_dead_zones(robot: Robot, q: Array) -> list[tuple[int, float, float]]:
     x[:, robot.layout.motor_q] = q
     x[:, robot.layout.joint_q] = joint_angles(robot, q)
     weight = CarriedWeight(robot).torque(x, robot.values)[0]
-    ratio = np.ones(robot.n) if robot.transmission is None else np.diag(robot.transmission)
     found = []
     for j, begin, end in zones:
         stiffness = robot.parameters.get(f"{robot.joints[j]}.stiffness")
         if stiffness is not None:  # a spring that came as an effect has a compliance
             doubt = float(np.hypot(0.5 * (end - begin), weight[j] / stiffness.value))
-            found.append((int(robot.layout.joint_q[j]), ratio[j] * 0.5 * (begin + end), abs(ratio[j]) * doubt))
+            found.append((j, 0.5 * (begin + end), doubt))
     return found
 
 

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """A position-controlled servo simulated with its controller, against an integration that shares no code with it."""
 
+import math
 from dataclasses import replace
 from pathlib import Path
 
@@ -81,6 +82,41 @@ def test_a_drive_that_is_off_lets_the_pendulum_swing(servo):
 def test_a_wrong_gain_is_seen(servo):
     soft = replace(servo, controller=replace(servo.controller, gain=(0.5 * servo.controller.gain[0],)))
     assert free_run(soft, pendulum(servo)).mean_abs["servo.motor_position"] > 0.05
+
+
+def loose_magnet(servo, half, seconds=3.0):
+    """The textbook servo whose controller reads a magnet that a pin pushes along, `half` either way; small steps."""
+    p, h = {name: parameter.value for name, parameter in servo.parameters.items()}, 1e-5
+    gain, supply = servo.controller.gain[0], servo.constants["motor.supply_voltage"]
+    sharpness = servo.choices.friction_sharpness
+    goals = np.arange(0.0, seconds, 0.02)
+    goal, read = 0.8 * np.sin(2.0 * goals), []
+    q = v = magnet = 0.0
+    for k in range(round(seconds / h)):
+        magnet = min(max(magnet, q - half), q + half)
+        if k % 500 == 0:
+            read.append(magnet)
+        volts = supply * min(max(gain * (goal[k // 2000] - magnet), -1.0), 1.0)
+        torque = p["motor.k_pwm"] * volts - p["motor.k_mi"] * v - p["servo.coulomb_torque"] * math.tanh(sharpness * v)
+        v += h * (torque - 0.49 * 9.81 * 0.1 * math.sin(q)) / (0.49 * 0.1**2 + p["motor.inertia"])
+        q += h * v
+    like = pendulum(servo, seconds=seconds)
+    encoder = replace(like.streams["motor_encoder"], values=np.array(read)[:, None])
+    return replace(like, streams={**like.streams, "motor_encoder": encoder})
+
+
+def test_a_controller_reads_its_encoder_with_the_play_that_it_has(servo):
+    half = 0.03
+    recording = loose_magnet(servo, half)
+    own = add_effect(servo, "encoder_hysteresis@servo", {"half_play": half})
+    assert free_run(own, recording).mean_abs["servo.motor_position"] < 2e-3
+    assert free_run(servo, recording).mean_abs["servo.motor_position"] > 5e-3
+
+
+def test_a_model_that_runs_away_is_infinitely_far_off(servo):
+    driven = servo.with_values({"motor.k_mi": -10.0})  # damped the wrong way round
+    with np.errstate(all="ignore"):
+        assert free_run(driven, pendulum(servo, seconds=0.5)).rms["servo.motor_position"] == np.inf
 
 
 def test_what_cannot_be_simulated_is_said(servo):

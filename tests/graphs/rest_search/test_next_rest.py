@@ -11,8 +11,13 @@ from lever_bench import C0, C1, K2, K3, K, hanging, lever
 from scipy.optimize import brentq
 from two_levers import BETA2, hardly_raised, resting_at, two_levers
 
+from jointscope.factors.calibration import DYNAMICS, Calibration
 from jointscope.graphs.rest_search.next_rest import next_rests
+from jointscope.graphs.rest_search.rest_candidates import candidate_rows
 from jointscope.graphs.rests.calibrate_rests import calibrate_rests
+from jointscope.graphs.rests.rest_set import RestSet
+from jointscope.graphs.starts.spring_knots import with_knots
+from jointscope.robots.files.effect_editing import add_effect, remove_effect
 from jointscope.tools.presentation.next_rest_text import next_rest_sentence
 from jointscope.tools.terminal.rests_text import rest_calibration_text
 
@@ -112,3 +117,23 @@ def test_postures_keep_to_limits_efforts_and_bent_springs(tmp_path):
         d = brentq(lambda d, tau=tau: K * d + K2 * d**2 + K3 * d**3 - tau, -0.5, 0.5)
         assert abs(d) < 1.15 * had
         assert advised.to_json()["load"]["link"] == "hook" if pull else advised.to_json()["load"] is None
+
+
+@pytest.mark.parametrize("label", ["spring_pieces_2@swing", "spring_limit@swing"])
+def test_springs_of_pieces_and_with_strings_are_not_bent_farther_than_they_were(tmp_path, label):
+    bare = remove_effect(lever(tmp_path), "spring_curve@swing")
+    rests = hanging(14, 5)
+    small = rests.only(np.abs(rests.q_link - rests.q_motor)[:, 0] < 0.1)
+    assert 4 < len(small) < len(rests)
+    robot = with_knots(add_effect(bare, label), [small])
+    tried = np.linspace(-1.5, 1.5, 13)[:, None]
+    seen, counts = RestSet.of(robot, small), []
+    states = seen.start(Calibration.of(robot))[0]
+    for each in (robot, bare):
+        whole = RestSet.of(each, small)
+        calibration = Calibration.of(each).only([DYNAMICS])
+        known = np.eye(len(calibration.names)) * 1e-4
+        pulls = np.tile([12.0, 0.0, 0.0], (13, 1))
+        rows = candidate_rows(whole, calibration, known, states, tried, pulls, ("hook",) * 13)
+        counts.append(np.count_nonzero(np.any(rows != 0.0, axis=(1, 2))))
+    assert counts[0] < counts[1]

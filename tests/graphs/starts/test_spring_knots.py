@@ -11,6 +11,8 @@ from lever_bench import hanging, lever
 
 from jointscope.graphs.starts.spring_knots import with_knots
 from jointscope.robots.files.effect_editing import add_effect, remove_effect
+from jointscope.robots.recordings.recording import Recording, Stream
+from jointscope.tools.verb_parts import rest_runs
 
 KNOTS = ("swing.spring_pieces_2.forward", "swing.spring_pieces_2.backward")
 
@@ -50,3 +52,36 @@ def test_without_encoders_on_the_links_knots_stay_where_the_file_has_them(with_p
     found = with_knots(with_pieces, [replace(hanging(20, 1), q_link=None)])
     assert [found.parameters[name].value for name in KNOTS] == [0.05, 0.05]
     assert all(found.parameters[name].fixed for name in KNOTS)
+
+
+def moving(link_angle, motor_angle) -> Recording:
+    """A lever whose encoders were read 100 times a second."""
+    times = 0.01 * np.arange(len(link_angle))
+    readings = {"motor_angle": motor_angle, "link_angle": link_angle, "command": 0.0 * link_angle}
+    streams = {name: Stream(name, times, q[:, None], ("swing",), "rad") for name, q in readings.items()}
+    return Recording("moves", "moves", 10**18, streams)
+
+
+def test_zeros_of_encoders_and_what_is_left_out_move_no_knots(with_pieces):
+    q = np.sin(0.05 * np.arange(400))
+    bend = np.where(q > 0.0, 0.03, 0.02) * q
+    pushed = bend + np.where((np.arange(400) > 100) & (np.arange(400) < 110), 0.4, 0.0)
+    link = replace(with_pieces.link_encoder, zero=np.array([0.7]))
+    motor = replace(with_pieces.motor_encoder, zero=np.array([-0.2]))
+    robot = with_pieces.with_sensors({link.name: link, motor.name: motor})
+    recording = moving(q + pushed + 0.7, q - 0.2).leaving_out([(0.95, 1.15)])
+    values = [with_knots(robot, [recording]).parameters[name].value for name in KNOTS]
+    np.testing.assert_allclose(values, [bend.max(), -bend.min()], rtol=1e-6)
+
+
+def test_rests_beside_motion_have_the_knots_of_all_recordings_held(with_pieces, monkeypatch):
+    rests = hanging(20, 1)
+    monkeypatch.setattr(rest_runs, "read_all_rests", lambda paths, robot, progress: [rests])
+    q = np.sin(0.05 * np.arange(400))
+    far = 1.5 * np.max(np.abs(rests.q_link - rests.q_motor))
+    robot, sets = rest_runs.weighted_rests(with_pieces, ["bench"], [moving(q + far * q, q)], lambda text, share: None)
+    knots = {name: robot.parameters[name] for name in KNOTS}
+    np.testing.assert_allclose([p.value for p in knots.values()], [far, far], rtol=0.01)
+    assert all(p.fixed for p in knots.values())
+    assert {name: sets[0].robot.parameters[name] for name in KNOTS} == knots
+    assert not {*KNOTS} & {*sets[0].model.names}

@@ -15,6 +15,7 @@ from scipy.linalg import solve_continuous_are
 
 import jointscope as js
 from jointscope.robots.errors import RobotError
+from jointscope.robots.files.effect_editing import add_effect
 
 PAGE = Path(__file__).resolve().parents[3] / "docs" / "linear_models.md"
 POSTURE = {"joint1": 0.2, "joint2": 0.5, "joint3": 0.6, "joint4": -0.3}
@@ -95,6 +96,15 @@ def test_a_rigid_joint_has_no_motor_of_its_own():
     model = js.linear_model(robot)
     assert model.A.shape == (10, 10) and model.B.shape == (10, 3)
     assert "joint1.q_motor" not in model.names
+
+
+def test_the_lag_of_an_encoder_with_play_is_no_state_that_a_feedback_could_move():
+    robot = js.load_robot("doggy")
+    loose = add_effect(robot, "encoder_hysteresis@joint2", {"half_play": 1e-3})
+    model, plain = js.linear_model(loose, {"joint2": 0.4}), js.linear_model(robot, {"joint2": 0.4})
+    assert model.names == plain.names
+    for own, other in ((model.A, plain.A), (model.B, plain.B), (model.state, plain.state)):
+        np.testing.assert_allclose(own, other, rtol=1e-12, atol=1e-12)
 
 
 def test_a_joint_that_is_not_there_is_named():
