@@ -14,7 +14,9 @@ from scipy.integrate import solve_ivp
 from scipy.linalg import solve_continuous_are
 
 import jointscope as js
+from jointscope.graphs.fixed_lag.window.state_names import state_names
 from jointscope.robots.errors import RobotError
+from jointscope.robots.files.effect_editing import add_effect
 
 PAGE = Path(__file__).resolve().parents[3] / "docs" / "linear_models.md"
 POSTURE = {"joint1": 0.2, "joint2": 0.5, "joint3": 0.6, "joint4": -0.3}
@@ -95,6 +97,19 @@ def test_a_rigid_joint_has_no_motor_of_its_own():
     model = js.linear_model(robot)
     assert model.A.shape == (10, 10) and model.B.shape == (10, 3)
     assert "joint1.q_motor" not in model.names
+
+
+def test_the_lag_of_an_encoder_with_play_is_no_part_of_it():
+    robot = add_effect(js.load_robot("doggy"), "hysteresis@joint1")
+    model = js.linear_model(robot, {"joint2": 0.4})
+    lagging = add_effect(add_effect(js.load_robot("doggy"), "encoder_hysteresis@joint2"), "hysteresis@joint1")
+    seen = js.linear_model(lagging, {"joint2": 0.4})
+    np.testing.assert_allclose(seen.A, model.A, atol=1e-9)
+    np.testing.assert_allclose(seen.B, model.B, atol=1e-9)
+    assert seen.names == model.names and seen.names[-1] == "hysteresis@joint1.memory"
+    whole = state_names(lagging.layout)
+    assert tuple(whole[i] for i in seen.rows) == seen.names
+    assert set(whole) - set(seen.names) == {"encoder_hysteresis@joint2.memory"}
 
 
 def test_a_joint_that_is_not_there_is_named():
