@@ -83,10 +83,18 @@ class Coupling:
             f"(file: {self.stated[i, j]:.6g})"
             for i, j in others
         )
+        turned = [
+            joint
+            for i, joint in enumerate(self.robot.joints)
+            if self.sigmas[i, i] > 0.0 and abs(self.matrix[i, i]) < OTHER_SIGMAS * self.sigmas[i, i]
+        ]
+        names = (
+            f"; {', '.join(turned)} not turned by its own motor: check `names` of both encoders first" if turned else ""
+        )
         where = ", ".join(r.path for fit in self.fits for r in fit.readings)
         return (
             f"{where}: the transmission of {robot_argument(self.robot)} is not that of its locked springs: {said}; "
-            f"write `{self.pasted}` (joint angles = matrix times motor angles)"
+            f"write `{self.pasted}` (joint angles = matrix times motor angles){names}"
         )
 
     def to_json(self) -> dict[str, Any]:

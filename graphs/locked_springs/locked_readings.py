@@ -8,6 +8,7 @@ on by a step since the last one. The stream with fewer samples gives the instant
 from __future__ import annotations
 
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
@@ -74,10 +75,7 @@ class LockedReadings:
         """
         link = robot.link_encoder
         if link is None:
-            raise RecordingError(
-                f"{recording.path}: with locked springs motors and links are compared, and {robot.path.name} has no "
-                "sensor of kind link_encoder; add one, or leave the recording out"
-            )
+            raise RecordingError(no_link_encoders(recording.path, robot))
         rows = np.array([robot.joints.index(joint) for joint in joints])
         motors, links = recording.streams[robot.motor_encoder.name].whole, recording.streams[link.name].whole
         sigma_motor, sigma_link = robot.motor_encoder.sigmas[rows], link.sigmas
@@ -118,6 +116,14 @@ class LockedReadings:
                 "between them: move the joints farther, one after the other"
             )
         return LockedReadings(**{**self.__dict__, "still": still})
+
+
+def no_link_encoders(path: str | Path, robot: Robot) -> str:
+    """Why a recording with locked springs is of no use to a robot without encoders on its links."""
+    return (
+        f"{path}: with locked springs motors and links are compared, and {robot.path.name} has no sensor of kind "
+        "link_encoder; add one, or leave the recording out"
+    )
 
 
 def _common_times(motors: Stream, links: Stream) -> Array:

@@ -26,12 +26,13 @@ MOVES = 100.0  # sigmas from which a joint is said to move
 OTHERS = ("rad", "deg", "m", "mm")
 
 
-def check_angle_units(recording: Recording, robot: Robot) -> None:
+def check_angle_units(recording: Recording, robot: Robot, coupled: bool = True) -> None:
     """Refuses positions in another unit than the robot file says.
 
     Args:
-        recording: of rests.
+        recording: of rests, or with locked springs.
         robot: with its limits.
+        coupled: whether the file says how far motors turn their links; without it links alone are judged.
 
     Raises:
         RecordingError: positions are far beyond what the URDF allows, or those of motors and links are in two units.
@@ -46,7 +47,7 @@ def check_angle_units(recording: Recording, robot: Robot) -> None:
     slides = np.array([joint in robot.tree.slides for joint in robot.joints])
     allowed = np.where(slides & ~np.isfinite(limits).all(axis=1), np.inf, allowed)
     # links first: a motor may be off by its transmission
-    for encoder in [each for each in (link, motor) if each is not None]:
+    for encoder in [each for each in (link, motor if coupled else None) if each is not None]:
         share = spans[encoder.name] / allowed
         j = int(np.argmax(share))
         if share[j] > TOO_FAR:
@@ -55,7 +56,7 @@ def check_angle_units(recording: Recording, robot: Robot) -> None:
                 f"{recording.path}: {encoder.channels[j]} spans {spans[encoder.name][j]:.4g} {unit}; "
                 f"{robot.tree.urdf.name} allows {allowed[j]:.4g} {unit}; {_hint(robot, encoder, j, float(share[j]))}"
             )
-    if link is not None:
+    if link is not None and coupled:
         _check_ratio(recording, robot, motor, link, spans)
 
 

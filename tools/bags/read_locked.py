@@ -8,10 +8,12 @@ from dataclasses import replace
 from pathlib import Path
 
 from jointscope.graphs.locked_springs.coupling import Coupling, find_coupling
-from jointscope.graphs.locked_springs.locked_readings import LockedReadings
+from jointscope.graphs.locked_springs.locked_readings import LockedReadings, no_link_encoders
+from jointscope.robots.errors import RecordingError
 from jointscope.robots.files.sections.locked_section import locked_in
 from jointscope.robots.model.robot import Robot
 from jointscope.robots.recordings.recording import must_count_once
+from jointscope.robots.rests.angle_units import check_angle_units
 from jointscope.tools.bags.read_recording import read_recording
 
 
@@ -24,12 +26,18 @@ def read_locked(path: str | Path, robot: Robot) -> LockedReadings:
 
     Raises:
         RobotError: no spring is there that could be locked, or the file names other recordings.
-        RecordingError: the bag cannot be read, has no encoders on the links, or hardly any motion.
+        RecordingError: the bag cannot be read, has no encoders on the links, angles in another unit, or hardly any
+            motion.
     """
     robot.need_motion()
     joints = locked_in(robot, path)
+    if robot.link_encoder is None:
+        raise RecordingError(no_link_encoders(path, robot))
     encoders = {s.name: s for s in (robot.motor_encoder, robot.link_encoder) if s is not None}
-    return LockedReadings.of(read_recording(path, replace(robot, sensors=encoders), locked_springs=True), robot, joints)
+    recording = read_recording(path, replace(robot, sensors=encoders), locked_springs=True)
+    if all(len(stream) for stream in recording.streams.values()):
+        check_angle_units(recording, robot, coupled=robot.transmission is not None)
+    return LockedReadings.of(recording, robot, joints)
 
 
 def read_coupling(paths: Sequence[str | Path], robot: Robot) -> Coupling:

@@ -14,6 +14,7 @@ from jointscope.robots.recordings.recording import Recording
 from jointscope.tools.closed_loop.planning.estimator_account import EstimatorAccount
 from jointscope.tools.closed_loop.planning.plan import Plan
 from jointscope.tools.closed_loop.planning.tracking import Tracking
+from jointscope.tools.simulator.effects_of_file import not_simulated
 
 Array = NDArray[np.float64]
 
@@ -108,6 +109,7 @@ class ClosedLoopResult:
             "hits": hits,
             "unstable": list(self.unstable),
             "runs": [_as_json(run) for run in self.runs],
+            **not_simulated(self.robot, self.truth),
             "truth": self.truth,
         }
 

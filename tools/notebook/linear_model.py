@@ -9,8 +9,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from jointscope.graphs.fixed_lag.window.state_names import state_names
 from jointscope.robots.dynamics.state_rates import StateRates
 from jointscope.robots.errors import RobotError
+from jointscope.robots.model.encoder_plays import EncoderPlays
 from jointscope.robots.model.robot import SHARPNESS, Robot
 
 Array = NDArray[np.float64]
@@ -27,9 +29,11 @@ class LinearModel:
     Attributes:
         A: shape (d, d).
         B: shape (d, n), by the command in its SI unit.
-        state: the equilibrium: positions and velocities of links, the same of motors, memories, shape (d,).
+        state: the equilibrium: positions and velocities of links, the same of motors, memories but for lags of encoders
+            with play, which move nothing, shape (d,).
         command: that holds it, without dry friction, shape (n,).
         names: of the state's components.
+        rows: where these are in a state of the estimator, shape (d,).
     """
 
     A: Array
@@ -37,6 +41,7 @@ class LinearModel:
     state: Array
     command: Array
     names: tuple[str, ...]
+    rows: NDArray[np.intp]
 
     @property
     def poles(self) -> NDArray[np.complex128]:
@@ -56,8 +61,8 @@ def linear_model(robot: Robot, posture: Mapping[str, float] | None = None) -> Li
 
     Dry friction is left out, as linear feedback cannot know it: a joint that slides has it as a constant torque, one
     that sticks does not answer at all (Ho, Kisner, "Trajectory Tracking Controller for a 4-DoF Flexible Joint Robot
-    Arm", app. B.1). Viscous friction, springs at their load, weight and memories of effects are in, lags of encoders
-    with play are not: they move no joint, and no feedback moves them but by a whole play.
+    Arm", app. B.1). Viscous friction, springs at their load, weight and memories of effects are in; errors of encoders
+    are not, for the estimator takes them off.
 
     Args:
         robot: with the values to use, as `calibrate` finds them.
@@ -96,11 +101,10 @@ def linear_model(robot: Robot, posture: Mapping[str, float] | None = None) -> Li
             "and motors can carry"
         )
     gain = rates.command_torque(np.ones(robot.n))
-    kept = np.arange(layout.size) if rates.plays is None else np.setdiff1d(np.arange(layout.size), rates.plays.lags)
-    names = _names(robot)
-    return LinearModel(
-        A[np.ix_(kept, kept)], by_torque[kept] * gain, x[kept], torque / gain, tuple(names[k] for k in kept)
-    )
+    plays = EncoderPlays.of(robot)
+    moving = np.arange(layout.size) if plays is None else np.delete(np.arange(layout.size), plays.lags)
+    names, B = state_names(layout), (by_torque * gain)[moving]
+    return LinearModel(A[np.ix_(moving, moving)], B, x[moving], torque / gain, tuple(names[i] for i in moving), moving)
 
 
 def _both_ways(rates: StateRates, x: Array, torque: Array) -> tuple[Array, Array, Array]:
@@ -113,11 +117,3 @@ def _both_ways(rates: StateRates, x: Array, torque: Array) -> tuple[Array, Array
         found.append(rates.with_jacobian(sliding, torque))
     rate, A, by_torque = (0.5 * (forth + back) for forth, back in zip(*found, strict=True))
     return rate, A, by_torque
-
-
-def _names(robot: Robot) -> tuple[str, ...]:
-    layout = robot.layout
-    links, motors = layout.links, layout.motors
-    named = [f"{link}.q_link" for link in links] + [f"{link}.v_link" for link in links]
-    named += [f"{motor}.q_motor" for motor in motors] + [f"{motor}.v_motor" for motor in motors]
-    return (*named, *layout.memories)

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 from jointscope.tools.closed_loop.closed_loop_result import CONTROLLERS, SOURCES, ClosedLoopResult, LoopRun
 from jointscope.tools.presentation.numbers import percent, significant
+from jointscope.tools.simulator.effects_of_file import not_simulated, not_simulated_text
 from jointscope.tools.terminal.text_table import text_table
 
 HEAD = [
@@ -18,9 +19,10 @@ def closed_loop_text(result: ClosedLoopResult) -> str:
     """The summary for the terminal."""
     truth, plan = result.truth, result.plan
     effects = ", ".join(f"{e['effect']}@{e['owner']}" for e in truth["effects"]) or "none"
+    left = not_simulated_text(not_simulated(result.robot, truth))
     parts = [
         f"{truth['robot']}, seed {truth['seed']}: {plan.count} in {truth['seconds']:g} s; "
-        f"hidden effects: {effects}; controllers know {result.model_told}",
+        f"hidden effects: {effects}; controllers know {result.model_told}" + (f"\n{left}" if left else ""),
         "Errors against the plan (rms), and what it cost (shares of the full command):\n"
         + text_table(HEAD, [_tracking(run) for run in result.runs], "<<" + ">" * (len(HEAD) - 2)),
     ]

@@ -6,6 +6,7 @@ from __future__ import annotations
 import numpy as np
 
 from jointscope.graphs.locked_springs.coupling import Coupling
+from jointscope.tools.bags.clocks.durations import counted
 from jointscope.tools.presentation.numbers import significant, with_sigma
 from jointscope.tools.terminal.text_table import text_table
 
@@ -32,8 +33,8 @@ def coupling_text(found: Coupling) -> str:
     lines += [text_table(["link angle per motor angle", "file", "locked springs", "± sigma"], rows, "<>>>")]
     if zero:
         lines.append(
-            f"Nothing else turns a motor: {zero} further elements of the inverse are zero within 4 sigma, and held "
-            "there."
+            f"Nothing else turns a motor: {counted(zero, 'further element')} of the inverse "
+            f"{'is' if zero == 1 else 'are'} zero within 4 sigma, and held there."
         )
     wrong = found.sentence()
     lines.append(wrong if wrong else "The transmission of the robot file is the one that the locked springs show.")

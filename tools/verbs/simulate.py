@@ -8,13 +8,13 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from jointscope.robots.effect_kinds.effect_at import EffectAt
 from jointscope.robots.errors import SimulationError
 from jointscope.robots.files.robot_file import load_robot
 from jointscope.robots.model.robot import Robot
 from jointscope.tools.bags.write_bag import write_bag
 from jointscope.tools.simulator import DEFAULT_SECONDS, Simulation, simulate_under
 from jointscope.tools.simulator.effect_list import effect_list
+from jointscope.tools.simulator.effects_of_file import not_simulated, not_simulated_text
 from jointscope.tools.terminal.progress import progress_bar
 from jointscope.tools.verb_parts.simulation_options import add_simulation_options, conditions_of
 from jointscope.tools.verb_parts.simulations.shaken import add_shaking_options, simulate_shaken
@@ -118,34 +118,21 @@ def _simulate(robot: Robot, args: argparse.Namespace, progress: Callable[[float]
 
 def _summary(simulation: Simulation, robot: Robot, bag: Path, truth_file: Path) -> dict[str, Any]:
     streams = simulation.recording.streams.values()
-    simulated = {f"{effect['effect']}@{effect['owner']}" for effect in simulation.truth["effects"]}
     return {
         "bag": str(bag),
         "truth_file": str(truth_file),
         "samples": {stream.name: len(stream) for stream in streams},
-        "not_simulated": [here.label for here in robot.effects if here.label not in simulated],
-        "to_simulate_them": " ".join(_option(here, robot) for here in robot.effects if here.label not in simulated),
+        **not_simulated(robot, simulation.truth),
         "truth": simulation.truth,
     }
-
-
-def _option(here: EffectAt, robot: Robot) -> str:
-    """What the command line would say to simulate an effect of the robot file at its value there."""
-    values = here.own(robot.values)
-    sizes = ",".join(f"{name}={value:.6g}" for name, value in values.items())
-    return f"--effect {here.label}{':' if sizes else ''}{sizes}"
 
 
 def _as_text(summary: dict[str, Any]) -> str:
     truth = summary["truth"]
     effects = ", ".join(f"{e['effect']}@{e['owner']}" for e in truth["effects"]) or "none"
     samples = ", ".join(f"{name} {count}" for name, count in summary["samples"].items())
-    left = ", ".join(summary["not_simulated"])
-    note = (
-        f"\n  not simulated, although in the robot file: {left}; name them: {summary['to_simulate_them']}"
-        if left
-        else ""
-    )
+    left = not_simulated_text(summary)
+    note = f"\n{left}" if left else ""
     return (
         f"{summary['bag']}: {truth['seconds']:g} s of {truth['robot']}, motion {truth['motion']}, "
         f"seed {truth['seed']}, {truth['friction']} friction\n"

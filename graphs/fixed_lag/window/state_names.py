@@ -3,6 +3,8 @@
 
 from __future__ import annotations
 
+from jointscope.robots.effect_kinds.effect import LINK_SIDE
+from jointscope.robots.effect_kinds.lagging_reading import LaggingReading
 from jointscope.robots.model.robot import Robot
 from jointscope.robots.parts.state_layout import StateLayout
 
@@ -19,7 +21,10 @@ def state_names(layout: StateLayout) -> tuple[str, ...]:
 
 
 def state_unit(robot: Robot, name: str) -> str:
-    """SI unit of a component; memories of effects have units of their own, which are not told."""
+    """SI unit of a component; of memories of effects only lags of encoders have one that is told."""
     owner, quantity = name.rsplit(".", 1)
+    for here in robot.effects:
+        if quantity == "memory" and here.label == owner and isinstance(here.effect, LaggingReading):
+            return robot.unit_at(here.owner.removesuffix(LINK_SIDE), "rad")
     turning = {"q_link": "rad", "q_motor": "rad", "v_link": "rad/s", "v_motor": "rad/s"}.get(quantity, "")
     return robot.unit_at(owner, turning)

@@ -45,7 +45,9 @@ def check_locked_springs(top: Section, robot: Robot) -> None:
                 f"{where}: expected a list of joints, or one for each recording ({{bench: [{robot.joints[0]}]}}), "
                 f"got {joints!r}"
             )
-        for joint in joints:
+        for k, joint in enumerate(joints):
+            if joint in joints[:k]:
+                raise RobotError(f"{where}: {joint} stands there twice; write it once")
             if joint not in robot.joints:
                 raise RobotError(f"{where}: no joint {joint!r}{did_you_mean(joint, robot.joints)}")
             if joint not in robot.layout.motors:

@@ -79,6 +79,17 @@ def test_a_coupling_that_is_missing_is_named_with_the_matrix_to_paste():
     assert "(file: 0); write `transmission: {matrix: [[0.322" in said and ", 0, 0, 0], [0, 0.300" in said
 
 
+def test_names_that_are_exchanged_come_to_mind_where_a_joint_does_not_follow_its_own_motor():
+    bench = locked_bench(BIOROB, 4)
+    links = bench.streams["link_encoder"]
+    exchanged = replace(links, values=links.values[:, [0, 1, 3, 2]])
+    recording = replace(bench, streams={**bench.streams, "link_encoder": exchanged})
+    joints = tuple(BIOROB.joints)
+    said = find_coupling(BIOROB, [LockedReadings.of(recording, BIOROB, joints)]).sentence()
+    assert said.endswith("; joint4 not turned by its own motor: check `names` of both encoders first")
+    assert "`names`" not in find_coupling(DOGGY, [readings(DOGGY)]).sentence()
+
+
 def test_one_locked_spring_shows_its_rope_and_leaves_the_others_of_the_file():
     robot = with_matrix(BIOROB, {at: value for at, value in BIOROB_T.items() if at != (3, 2)})
     coupling = find_coupling(robot, [readings(BIOROB, joints=("joint4",))])

@@ -14,6 +14,7 @@ from scipy.integrate import solve_ivp
 from scipy.linalg import solve_continuous_are
 
 import jointscope as js
+from jointscope.graphs.fixed_lag.window.state_names import state_names
 from jointscope.robots.errors import RobotError
 from jointscope.robots.files.effect_editing import add_effect
 
@@ -98,13 +99,17 @@ def test_a_rigid_joint_has_no_motor_of_its_own():
     assert "joint1.q_motor" not in model.names
 
 
-def test_the_lag_of_an_encoder_with_play_is_no_state_that_a_feedback_could_move():
-    robot = js.load_robot("doggy")
-    loose = add_effect(robot, "encoder_hysteresis@joint2", {"half_play": 1e-3})
-    model, plain = js.linear_model(loose, {"joint2": 0.4}), js.linear_model(robot, {"joint2": 0.4})
-    assert model.names == plain.names
-    for own, other in ((model.A, plain.A), (model.B, plain.B), (model.state, plain.state)):
-        np.testing.assert_allclose(own, other, rtol=1e-12, atol=1e-12)
+def test_the_lag_of_an_encoder_with_play_is_no_part_of_it():
+    robot = add_effect(js.load_robot("doggy"), "hysteresis@joint1")
+    model = js.linear_model(robot, {"joint2": 0.4})
+    lagging = add_effect(add_effect(js.load_robot("doggy"), "encoder_hysteresis@joint2"), "hysteresis@joint1")
+    seen = js.linear_model(lagging, {"joint2": 0.4})
+    np.testing.assert_allclose(seen.A, model.A, atol=1e-9)
+    np.testing.assert_allclose(seen.B, model.B, atol=1e-9)
+    assert seen.names == model.names and seen.names[-1] == "hysteresis@joint1.memory"
+    whole = state_names(lagging.layout)
+    assert tuple(whole[i] for i in seen.rows) == seen.names
+    assert set(whole) - set(seen.names) == {"encoder_hysteresis@joint2.memory"}
 
 
 def test_a_joint_that_is_not_there_is_named():

@@ -411,6 +411,25 @@ def test_the_verb_says_which_effects_of_the_robot_file_it_does_not_simulate(tmp_
     assert "not simulated" not in capsys.readouterr().out
 
 
+def test_the_verb_advises_no_option_that_it_refuses(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    effects = "cogging@joint1", "spring_pieces_1@joint2", "encoder_hysteresis@joint3", "load_scale@robot"
+    assert main(["add", "doggy", *effects, "-o", "many.yaml"]) == 0
+    capsys.readouterr()
+    assert verb("many.yaml", "-o", "a.mcap", "--seconds", "1", "--json", "a.json") == 0
+    told = [line.strip() for line in capsys.readouterr().out.splitlines()[-3:]]
+    head, options = told[0].split("; name them: ")
+    assert head == f"not simulated, although in the robot file: {', '.join(effects)}"
+    assert told[1].startswith("cannot be simulated: spring_pieces_1@joint2: a real spring has no knots; simulate ")
+    assert told[2].startswith("cannot be simulated: load_scale@robot: no loads hang on ")
+    assert verb("many.yaml", "-o", "b.mcap", "--seconds", "1", *options.split()) == 0
+    assert (
+        "not simulated, although in the robot file: spring_pieces_1@joint2, load_scale@robot\n"
+        in capsys.readouterr().out
+    )
+    assert set(json.loads(Path("a.json").read_text())["cannot_be_simulated"]) == {effects[1], effects[3]}
+
+
 def test_the_verb_leaves_nothing_behind_when_it_fails(tmp_path):
     with pytest.raises(JointscopeError, match=r"train.mcap: the folder .*nowhere does not exist"):
         verb("doggy", "-o", str(tmp_path / "nowhere" / "train.mcap"))

@@ -136,6 +136,21 @@ def test_bad_input_is_one_line(arguments, text, capsys):
     assert error.count("\n") == 1
 
 
+def test_effects_of_the_file_that_are_not_in_the_truth_are_named(tmp_path, capsys):
+    arm, out = str(tmp_path / "arm.yaml"), tmp_path / "loop.json"
+    assert main(["add", "doggy", "motor_viscous@joint2", "spring_pieces_1@joint1", "-o", arm]) == 0
+    capsys.readouterr()
+    short = ["--seconds", "4", "--controllers", "p", "--sources", "true", "--json", str(out)]
+    assert main(["closed-loop", arm, *short]) == 0
+    lines = capsys.readouterr().out.splitlines()
+    told = (
+        "not simulated, although in the robot file: motor_viscous@joint2, spring_pieces_1@joint1; name them: --effect "
+    )
+    assert lines[1].strip() == f"{told}motor_viscous@joint2:coefficient=0.5"
+    assert lines[2].strip().startswith("cannot be simulated: spring_pieces_1@joint1: ")
+    assert json.loads(out.read_text())["not_simulated"] == ["motor_viscous@joint2", "spring_pieces_1@joint1"]
+
+
 def test_without_the_estimator_the_answer_names_the_best(doggy):
     from jointscope.tools.closed_loop.run_closed_loop import LoopOptions, run_closed_loop
 

@@ -112,6 +112,7 @@ def test_without_the_file_s_word_what_springs_do_not_do_tells(capsys):
             "bad.yaml: locked_springs: expected a list of joints, or one for each recording ({bench: [joint1]})",
         ),
         ("{bench: [elbow]}", "bad.yaml: locked_springs.bench: no joint 'elbow'; expected joint1, joint2"),
+        ("{bench: [joint1, joint1]}", "bad.yaml: locked_springs.bench: joint1 stands there twice; write it once"),
         ("{late: [joint1]}", "bad.yaml: locked_springs names late, but not bench; add `bench: [JOINT, ...]`"),
     ],
 )
@@ -125,7 +126,10 @@ def test_mistakes_in_the_section_are_named(section, told, capsys):
 @pytest.mark.parametrize(
     ("words", "told"),
     [
-        (["doggy", "--locked-springs", "bench.mcap"], "topic /motor_command, field 'effort': no joint 'joint1' in the"),
+        (
+            ["doggy", "--locked-springs", "bench.mcap"],
+            "bench.mcap: with locked springs motors and links are compared, and doggy.yaml has no sensor of kind link_",
+        ),
         (
             ["biorob", "bench.mcap", "--locked-springs", "bench.mcap"],
             "bench.mcap is given as motion and as locked",
@@ -144,6 +148,32 @@ def test_mistakes_in_the_section_are_named(section, told, capsys):
 )
 def test_what_cannot_be_is_refused_in_one_line(words, told, capsys):
     assert complaint(capsys, "calibrate", *words, "-o", "no.yaml").startswith(told)
+    assert not Path("no.yaml").exists()
+
+
+def turned(recording, **factors):
+    streams = {
+        name: replace(stream, values=stream.values * factors.get(name, 1.0))
+        for name, stream in recording.streams.items()
+    }
+    return replace(recording, streams=streams)
+
+
+@pytest.mark.parametrize(
+    ("file", "encoders"),
+    [
+        ("biorob", ("link_encoder",)),
+        ("biorob", ("motor_encoder",)),  # without a matrix in the file it might be a gear of 57
+        ("bare.yaml", ("link_encoder",)),
+        ("bare.yaml", ("motor_encoder", "link_encoder")),
+    ],
+)
+def test_degrees_are_no_matrix(file, encoders, capsys):
+    degrees = turned(locked_bench(BIOROB, 3), **dict.fromkeys(encoders, 180.0 / np.pi))
+    write_bag(Path("degrees.mcap"), replace(degrees, path="degrees"), BIOROB)
+    said = complaint(capsys, "calibrate", file, "--locked-springs", "degrees.mcap", "-o", "no.yaml")
+    told = f"look like degrees: set `unit` of sensors.{encoders[-1]} in the robot file (now rad) to deg"
+    assert said.startswith("degrees.mcap: joint") and said.endswith(told)
     assert not Path("no.yaml").exists()
 
 

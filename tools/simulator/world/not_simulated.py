@@ -8,6 +8,7 @@ from __future__ import annotations
 
 NOT_SIMULATED = {
     "coriolis": "every simulation contains the Coriolis terms; calibrate with 'coriolis: false' in the robot file",
+    "load_scale": "no loads hang on a simulated arm in motion; simulate payload",
     "joint_elasticity": "a joint is simulated as its robot file has it; calibrate with a file that declares it rigid",
     **{
         f"spring_pieces_{pieces}": "a real spring has no knots; simulate spring_ropes, spring_curve or spring_limit"

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from jointscope.robots.errors import SimulationError
 from jointscope.robots.model.robot import Robot
+from jointscope.tools.simulator.effects_of_file import not_simulated, not_simulated_text
 from jointscope.tools.verb_parts.simulation_options import assignments, conditions_of
 from jointscope.tools.writing.whole_file import write_json
 
@@ -125,7 +126,8 @@ def _of_motion(robot: Robot, args: argparse.Namespace, shaking: Any) -> Written:
         f"\n  its values: jointscope calibrate {args.robot} {bags[0]} -o {Path(args.robot).stem}_calibrated.yaml"
         "\n  (as motion; --frequency needs a section `frequency` in the robot file, and torques that were measured)"
     )
-    return bags, len(multisine.lines), truth, hint
+    left = not_simulated_text(not_simulated(robot, truth))
+    return bags, len(multisine.lines), truth, hint + (f"\n{left}" if left else "")
 
 
 def _said(multisine: Any, poses: Mapping[str, Any], unit: str) -> str:
