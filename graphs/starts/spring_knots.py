@@ -66,16 +66,17 @@ def deflections_of(robot: Robot, seen: Iterable[Array]) -> dict[str, dict[str, f
 
 
 def _pair(robot: Robot, recording: Recording | Rests) -> Pair | None:
-    """What encoders read at the same times; None without encoders on the links."""
+    """What encoders read at the same times, their zeros taken off; None without encoders on the links."""
     if isinstance(recording, Rests):
         return None if recording.q_link is None else (recording.q_motor, recording.q_link)
     if robot.link_encoder is None:
         return None
     motor, link = (recording.streams[sensor.name] for sensor in (robot.motor_encoder, robot.link_encoder))
+    zeros = robot.motor_encoder.zero, robot.link_encoder.zero
     inside = (motor.times >= link.times[0]) & (motor.times <= link.times[-1])
     times = motor.times[inside]
     q_link = np.column_stack([np.interp(times, link.times, column) for column in link.values.T])
-    return motor.values[inside], q_link
+    return motor.values[inside] - zeros[0], q_link - zeros[1]
 
 
 def _seen(robot: Robot, q_motor: Array, q_link: Array) -> Array:

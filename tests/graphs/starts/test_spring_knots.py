@@ -11,6 +11,7 @@ from lever_bench import hanging, lever
 
 from jointscope.graphs.starts.spring_knots import with_knots
 from jointscope.robots.files.effect_editing import add_effect, remove_effect
+from jointscope.robots.recordings.recording import Recording, Stream
 
 KNOTS = ("swing.spring_pieces_2.forward", "swing.spring_pieces_2.backward")
 
@@ -50,3 +51,16 @@ def test_without_encoders_on_the_links_knots_stay_where_the_file_has_them(with_p
     found = with_knots(with_pieces, [replace(hanging(20, 1), q_link=None)])
     assert [found.parameters[name].value for name in KNOTS] == [0.05, 0.05]
     assert all(found.parameters[name].fixed for name in KNOTS)
+
+
+def test_zeros_of_encoders_are_no_deflection(with_pieces):
+    sensors = {s.name: replace(s, zero=np.array([zero])) for s, zero in zip(with_pieces.sensors.values(), (0.7, -0.4), strict=True)}
+    robot, t = replace(with_pieces, sensors=sensors), np.linspace(0.0, 5.0, 501)
+    q_motor, deflection = np.sin(t)[:, None], 0.02 * np.cos(3.0 * t)[:, None]
+    motor, link = sensors
+    streams = {
+        motor: Stream(motor, t, q_motor + 0.7, ("swing.motor_position",), "rad"),
+        link: Stream(link, t, q_motor + deflection - 0.4, ("swing.link_position",), "rad"),
+    }
+    found = with_knots(robot, [Recording("moves", "", 0, streams)])
+    np.testing.assert_allclose([found.parameters[name].value for name in KNOTS], 0.02, rtol=1e-3)
