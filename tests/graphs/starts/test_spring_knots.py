@@ -54,7 +54,8 @@ def test_without_encoders_on_the_links_knots_stay_where_the_file_has_them(with_p
 
 
 def test_zeros_of_encoders_are_no_deflection(with_pieces):
-    sensors = {s.name: replace(s, zero=np.array([zero])) for s, zero in zip(with_pieces.sensors.values(), (0.7, -0.4), strict=True)}
+    zeros = zip(with_pieces.sensors.values(), (0.7, -0.4), strict=True)
+    sensors = {s.name: replace(s, zero=np.array([zero])) for s, zero in zeros}
     robot, t = replace(with_pieces, sensors=sensors), np.linspace(0.0, 5.0, 501)
     q_motor, deflection = np.sin(t)[:, None], 0.02 * np.cos(3.0 * t)[:, None]
     motor, link = sensors
