@@ -18,7 +18,7 @@ from jointscope.graphs.discovery.discovery_result import SavedStep
 from jointscope.graphs.discovery.side_by_side import SideBySide
 from jointscope.graphs.joint_kinds.arm_graph import ArmCalibration, arm_graph
 from jointscope.graphs.joint_kinds.beside_motion import calibrate_beside_motion
-from jointscope.graphs.rests.rests_beside_motion import with_rests
+from jointscope.graphs.rests.rests_beside_motion import weighted_rests, with_rests
 from jointscope.graphs.solving.batch_solver import Progress, Solver, solve
 from jointscope.graphs.solving.set_problem import SetProblem
 from jointscope.graphs.transmission.calibrate_links import calibrate_links
@@ -47,7 +47,7 @@ from jointscope.tools.notebook.results import Calibrated, Compared, Diagnosed, D
 from jointscope.tools.verb_parts.frequency_runs import read_all_shaken
 from jointscope.tools.verb_parts.named_recordings import diagnosis_of, discovery_of
 from jointscope.tools.verb_parts.pose_runs import weighted_poses
-from jointscope.tools.verb_parts.rest_runs import weighted_rests
+from jointscope.tools.verb_parts.rest_runs import read_all_rests
 from jointscope.tools.verdicts.judgement import judge
 
 
@@ -107,7 +107,8 @@ def calibrate(
     else:
         report, paths = progress or _quiet, [[Path(path) for path in each] for each in (rests, poses, frequency)]
         placed, at_poses = weighted_poses(model, paths[1], report)
-        all_sets = [*sets, *weighted_rests(placed, paths[0], report), *at_poses]
+        placed, at_rest = weighted_rests(placed, read_ones, read_all_rests(paths[0], placed, report), report)
+        all_sets = [*sets, *at_rest, *at_poses]
         options: dict[str, Any] = {"biases_only": biases_only, "solver": solver, "sets": all_sets, "progress": progress}
         shaken = read_all_shaken(placed, paths[2], report)
         if shaken:

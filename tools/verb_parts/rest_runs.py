@@ -201,15 +201,6 @@ def _with_rests_json(result: Any) -> dict[str, Any]:
     }
 
 
-def weighted_rests(robot: Robot, paths: Sequence[Path], progress: Progress) -> list[Any]:
-    """Rests for an estimate with motion, each with the weight that it deserves; none without paths."""
-    if not paths:
-        return []
-    from jointscope.graphs.rests.calibrate_rests import settled_rests
-
-    return list(settled_rests(robot, read_all_rests(paths, robot, progress), progress)[0])
-
-
 def compare_rests(robots: Mapping[str, Robot], paths: Sequence[Path], progress: Progress) -> tuple[str, dict[str, Any]]:
     """Errors of some models on rests, for the screen and for JSON."""
     from jointscope.graphs.rests.rest_errors import rest_errors

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from lever_bench import hanging, lever
 
+from jointscope.graphs.rests.rests_beside_motion import weighted_rests
 from jointscope.graphs.starts.spring_knots import with_knots
 from jointscope.robots.files.effect_editing import add_effect, remove_effect
 from jointscope.robots.recordings.recording import Recording, Stream
@@ -65,3 +66,22 @@ def test_zeros_of_encoders_are_no_deflection(with_pieces):
     }
     found = with_knots(robot, [Recording("moves", "", 0, streams)])
     np.testing.assert_allclose([found.parameters[name].value for name in KNOTS], 0.02, rtol=1e-3)
+
+
+def test_motion_and_rests_in_one_graph_have_the_same_knots(with_pieces):
+    rests = hanging(40, 1)
+    d, (motor, link) = rests.q_link - rests.q_motor, with_pieces.sensors
+    t = np.linspace(0.0, 5.0, 501)
+    q_motor = np.sin(t)[:, None]
+    deflection = 0.5 * d.max() * np.sin(3.0 * t)[:, None]  # less than at rest to one side, more or less to the other
+    streams = {
+        motor: Stream(motor, t, q_motor, ("swing.motor_position",), "rad"),
+        link: Stream(link, t, q_motor + deflection, ("swing.link_position",), "rad"),
+    }
+    moves = Recording("moves", "", 0, streams)
+    robot, (problem,) = weighted_rests(with_pieces, [moves], [rests], lambda text, share: None)
+    expected = [d.max(), max(-d.min(), -deflection.min())]
+    for each in (robot, problem.robot, with_knots(robot, [moves])):  # a calibration of the motion leaves them there
+        np.testing.assert_allclose([each.parameters[name].value for name in KNOTS], expected, rtol=1e-3)
+        assert all(each.parameters[name].fixed for name in KNOTS)
+    assert weighted_rests(with_pieces, [moves], [], lambda text, share: None) == (with_pieces, [])
