@@ -114,6 +114,7 @@ def diagnose_kinds(
     """
     held = KindsRecordings(motion=() if holdout is None else (holdout,), rests=tuple(rests_holdout))
     given = KindsRecordings(tuple(recordings), tuple(sessions), tuple(shaken), tuple(rests))
+    given.must_be_apart(held)
     return ask_kinds(robot, given, held, progress or (lambda text, share: None), options)
 
 

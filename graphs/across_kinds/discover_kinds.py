@@ -105,7 +105,7 @@ def discover_kinds(
         options: of `diagnose`, for the recordings of motion.
 
     Raises:
-        RecordingError: kinds that do not need more than one graph.
+        RecordingError: kinds that do not need more than one graph, or what is held out is also for training.
         JointscopeError: as of `diagnose_kinds` and `calibrate_shared`.
     """
     if len(given.kinds) == len(given.of_arm) or len(given.kinds) == 1:
@@ -113,7 +113,9 @@ def discover_kinds(
             "recordings of one graph: call discover for motion, discover_rests for rests, discover_arm for poses and "
             "frequency responses"
         )
-    return _Search(given, held or KindsRecordings(), progress or (lambda text, share: None), options).run(robot)
+    held = held or KindsRecordings()
+    given.must_be_apart(held)
+    return _Search(given, held, progress or (lambda text, share: None), options).run(robot)
 
 
 class _Search:

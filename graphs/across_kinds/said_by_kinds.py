@@ -25,7 +25,6 @@ from jointscope.robots.geometry.error_parameters import STIFFNESS
 
 MOTION, RESTS = "motion", "rests"
 APART, SHARE = 3.0, 0.5  # [sigma], share of the larger one: from both on sizes in two kinds contradict each other
-OTHER_SIGN = "encoder_eccentricity"  # which arms add to a reading, and the catalogue says of what it has too much
 LEAST_LEFT = 1e-6  # share of squares, of which a smaller one would say no more
 ORDER = ("missing", "possible", "absent", "untestable")
 Size = tuple[float, float, str]
@@ -193,8 +192,7 @@ def said_by_arm(candidates: Sequence[ArmCandidate], kinds: Sequence[str]) -> dic
     found: dict[str, dict[str, Said]] = {kind: {} for kind in kinds}
     for c in candidates:
         unit = "rad/(N m)" if c.hypothesis.kind.soft else c.hypothesis.kind.unit
-        sign = -1.0 if c.hypothesis.kind.id == OTHER_SIGN else 1.0
-        pairs = zip(c.hypothesis.names, [sign * size for size in c.sizes], c.sigmas, strict=True)
+        pairs = zip(c.hypothesis.names, c.sizes, c.sigmas, strict=True)
         sizes = {_last_part(name, c.hypothesis.kind.soft): (value, sigma, unit) for name, value, sigma in pairs}
         evidence = c.evidence  # of both kinds together: it counts once
         for kind in kinds:

@@ -11,7 +11,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import replace
 
-from jointscope.graphs.across_kinds.said_by_kinds import MOTION, OTHER_SIGN, RESTS, AcrossKinds
+from jointscope.graphs.across_kinds.said_by_kinds import MOTION, RESTS, AcrossKinds
 from jointscope.robots.effect_kinds.effect_at import EffectAt
 from jointscope.robots.files.effect_catalogue import catalogue
 from jointscope.robots.files.effect_editing import add_effect, cannot_be_added, remove_effect
@@ -99,5 +99,5 @@ def _of_arm(hypothesis: ArmHypothesis, start: Mapping[str, float]) -> dict[str, 
         if hypothesis.kind.soft:
             found[name] = 1.0 / max(start[last.replace(STIFFNESS, "compliance")], 0.1 * softest)
         else:
-            found[name] = -start[last] if hypothesis.kind.id == OTHER_SIGN else start[last]
+            found[name] = start[last]
     return found

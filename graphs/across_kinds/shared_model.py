@@ -20,13 +20,11 @@ from jointscope.graphs.poses.calibrate_poses import PoseCalibration, calibrate_p
 from jointscope.graphs.poses.tip_errors import whitened
 from jointscope.graphs.poses.tracker_start import placed
 from jointscope.graphs.refits.validation import fit_and_judge, judged_error, reported_heldout_error
-from jointscope.graphs.rests.calibrate_rests import settled_rests
 from jointscope.graphs.rests.rest_errors import rest_errors
 from jointscope.graphs.rests.rest_set import RestSet
-from jointscope.graphs.rests.rests_beside_motion import with_rests
+from jointscope.graphs.rests.rests_beside_motion import weighted_rests, with_rests
 from jointscope.graphs.solving.batch_solver import Progress, Solver, solve
 from jointscope.graphs.solving.set_problem import SetProblem
-from jointscope.graphs.starts.spring_knots import with_knots
 from jointscope.robots.geometry.arm_effects import FREQUENCY, POSES
 from jointscope.robots.model.robot import Robot
 from jointscope.robots.rests.rests import Rests
@@ -69,13 +67,11 @@ def calibrate_shared(
     if not given.motion:
         still = calibrate_with_rests(robot, given.rests, given.poses, given.shaken, report)
         return SharedModel(still.robot, None, still, still.poses, still.rests.problems)
-    poses, at_rest = None, list[RestSet]()
-    robot = with_knots(robot, [*given.motion, *given.rests])
+    poses = None
     if given.poses:
         poses = calibrate_poses(robot, given.poses, report)
         robot = _placed(robot, poses)
-    if given.rests:
-        at_rest = settled_rests(robot, given.rests, report)[0]
+    robot, at_rest = weighted_rests(robot, given.motion, given.rests, report)
     still_sets: list[SetProblem] = [*at_rest, *_own_size(robot, poses)]
     calibration = partial(calibrate, sets=still_sets)
     if given.shaken:

@@ -2,8 +2,9 @@
 """What drives and motors do that is not linear, as the motion that was measured makes them do it.
 
 A wave of a gear and a spring that hardens are an offset u between motor and link, whose torque then is that of the
-spring turned by it; a wave also levers the torque that is passed on. One of an encoder (o = 1) moves the rotor, too:
-a scale of the angle of 1 + 1e-4, which is as large as sigmas of drives. Friction laws are torques p of the motor:
+spring turned by it; a wave also levers the torque that is passed on. One of an encoder (o = 1 unless a parameter says
+otherwise) is what the reading has too much, so that c and s have the other sign, and moves the rotor, too: a scale of
+the angle of 1 + 1e-4, which is as large as sigmas of drives. Friction laws are torques p of the motor:
 
     u = c cos(o q) + s sin(o q),    -k3 d^3 / (k + j w d)
     p = pull u'(q),      J u'' + f u',      T e^(-(v / v_s)^2) tanh(k v),      c |pull| tanh(k v)
@@ -31,6 +32,7 @@ from jointscope.robots.geometry.error_parameters import (
     TORQUE_DELAY,
     TORQUE_SHARE,
     WAVES,
+    WAVES_ORDER,
 )
 from jointscope.robots.geometry.flexible_arm import FlexibleArm
 
@@ -81,11 +83,9 @@ def motor_effects(
         laws = {part: values[f"{joint}.{part}"] for part in LAWS if f"{joint}.{part}" in values}
         if not laws:
             continue
-        sign = {part: -1.0 for part in WAVES} if joint in arm.misread else dict[str, float]()
-        laws = {part: sign.get(part, 1.0) * value for part, value in laws.items()}
         motion = _Motion.of(arm, pose, values, x, i, sharpness[i])
-        order = values.get(f"{joint}.{RIPPLE[2]}", 0.0)
-        own = {part: motion.offset(part, order) for part in laws}
+        order, of_disk = values.get(f"{joint}.{RIPPLE[2]}", 0.0), values.get(f"{joint}.{WAVES_ORDER}", 1.0)
+        own = {part: motion.offset(part, of_disk if part in WAVES else order) for part in laws}
         offset[:, :, i] = _summed(laws, own)
         motion = motion.passing(offset[:, :, i])
         beside = {part: motion.torque(part, order) for part in laws}
@@ -96,16 +96,14 @@ def motor_effects(
         turning = motion.sharper()
         sharper[:, :, i] = _summed(laws, {part: turning.torque(part, order) for part in DRY if part in laws})
         stiffer[i] = 3.0 * max(laws.get(CUBIC, 0.0), 0.0) * motion.square
-        waves |= {f"{joint}.{p}": (i, _times(sign.get(p), own[p]), _times(sign.get(p), beside[p])) for p in laws}
+        waves |= {f"{joint}.{part}": (i, own[part], beside[part]) for part in laws}
         if order:
             cos, sin = (laws.get(part, 0.0) for part in RIPPLE[:2])
             waves[f"{joint}.{RIPPLE[2]}"] = i, *motion.by_order(order, cos, sin)
+        if f"{joint}.{WAVES_ORDER}" in values:
+            turned = -motion.by_order(of_disk, *(laws.get(part, 0.0) for part in WAVES))[0]
+            waves[f"{joint}.{WAVES_ORDER}"] = i, turned, rotor * turned
     return MotorEffects(waves, offset, torque, sharper, stiffer)
-
-
-def _times(sign: float | None, wave: Complex | None) -> Complex | None:
-    """A wave, or that of the other sign."""
-    return wave if sign is None or wave is None else np.asarray(sign * wave)
 
 
 def measured_torques(
@@ -182,7 +180,9 @@ class _Motion:
         """By which an effect of unit size turns the drive, shape (b, K) [rad]."""
         if part == CUBIC:
             return -self._lines(self._in_time(self.d) ** 3) / self.spring  # the damper has no part in its torque
-        return self._lines(self._wave(part, order)[0]) if part in (*WAVES, *RIPPLE[:2]) else None
+        if part in WAVES:
+            return -self._lines(self._wave(part, order)[0])
+        return self._lines(self._wave(part, order)[0]) if part in RIPPLE[:2] else None
 
     def torque(self, part: str, order: float) -> Complex | None:
         """That the motor needs for an effect of unit size, shape (b, K) [N m]."""
@@ -199,8 +199,7 @@ class _Motion:
         return self._lines(self.q * slope), self._lines(self.pull * (slope - order * self.q * u))
 
     def _wave(self, part: str, order: float) -> tuple[Array, Array]:
-        """A wave of the gear, or of the encoder once per turn, and its slope."""
-        order = 1.0 if part in WAVES else order
+        """A wave of the gear, or of the encoder, and its slope."""
         c, s = np.cos(order * self.q), np.sin(order * self.q)
         return (c, -order * s) if part in (WAVES[0], RIPPLE[0]) else (s, order * c)
 

@@ -178,17 +178,21 @@ def find_coupling(robot: Robot, readings: Sequence[LockedReadings]) -> Coupling:
         readings: of each recording.
 
     Raises:
-        RecordingError: a spring deflects that is said to be locked, or no transmission is like that.
+        RecordingError: a spring deflects that is said to be locked, no transmission is like that, or none was found.
     """
     stated = stated_matrix(robot)
     A: Array = np.asarray(np.linalg.inv(stated), dtype=np.float64)
     fits = []
     variance = np.zeros((robot.n,) * 4)  # of elements of A, without zeros and delays
-    for joints in dict.fromkeys(r.joints for r in readings):
-        some = [r for r in readings if r.joints == joints]
+    groups = [[r for r in readings if r.joints == joints] for joints in dict.fromkeys(r.joints for r in readings)]
+    for some in sorted(groups, key=lambda group: sum(map(len, group))):  # a row has what its longest recordings say
         fit = fit_coupling(some, A[some[0].rows])
         check_locked(fit, robot)
+        _must_have_converged(fit, robot)
         A[some[0].rows] = fit.A
+        told = np.zeros(A.shape, bool)
+        told[np.ix_(some[0].rows, ~np.all([r.still for r in some], axis=0))] = True
+        variance[told] = variance[:, :, told] = 0.0
         places = [(int(some[0].rows[k]), int(j)) for k, j in np.argwhere(fit.free)]
         for a, (i, j) in enumerate(places):
             for b, (k, m) in enumerate(places):
@@ -204,3 +208,11 @@ def find_coupling(robot: Robot, readings: Sequence[LockedReadings]) -> Coupling:
     # T changes by -T dA T
     sigmas = np.sqrt(np.maximum(np.einsum("ia,bj,abcd,ic,dj->ij", T, T, variance, T, T), 0.0))
     return Coupling(robot, T, sigmas, stated, tuple(fits))
+
+
+def _must_have_converged(fit: CouplingFit, robot: Robot) -> None:
+    if not fit.converged:
+        raise RecordingError(
+            f"{fit.readings[0].path}: no matrix between motors and links was found (no convergence); check names, "
+            f"signs and units of both encoders in {robot_argument(robot)}, and that joints move one after the other"
+        )

@@ -40,6 +40,7 @@ class CouplingFit:
         rms: residual of each locked joint, shape (k,) [rad].
         explained: what its encoders explain, shape (k,) [rad].
         cost: at the end.
+        converged: whether the last step was small.
     """
 
     readings: tuple[LockedReadings, ...]
@@ -52,6 +53,7 @@ class CouplingFit:
     rms: Array
     explained: Array
     cost: float
+    converged: bool
 
     @property
     def sigmas(self) -> Array:
@@ -142,6 +144,7 @@ def _fitted(
     delays = [0.0] * len(readings) if near is None else list(near.delays)
     count = int(free.sum())
     p = count + len(readings) * (k + 1)
+    converged = False
     for _ in range(ROUNDS):
         H, g, cost = np.zeros((p, p)), np.zeros(p), 0.0
         parts = [_rows(*each, widened) for each in zip(readings, [A] * len(readings), zeros, delays, strict=True)]
@@ -152,6 +155,9 @@ def _fitted(
             H[np.ix_(index, index)] += H_i
             g[index] += g_i
             cost += rows.cost
+        if not np.all(np.isfinite(H)):
+            covariance = np.full_like(H, np.nan)
+            break
         scale = 1.0 / np.sqrt(np.diag(H))
         covariance = np.linalg.pinv(H * np.outer(scale, scale), hermitian=True) * np.outer(scale, scale)
         step = -covariance @ g
@@ -159,13 +165,14 @@ def _fitted(
         for i in range(len(readings)):
             begin = count + i * (k + 1)
             zeros[i], delays[i] = zeros[i] + step[begin : begin + k], delays[i] + float(step[begin + k])
-        if float(np.max(np.abs(step) / np.sqrt(np.maximum(np.diag(covariance), 1e-300)))) < SETTLED:
+        converged = float(np.max(np.abs(step) / np.sqrt(np.maximum(np.diag(covariance), 1e-300)))) < SETTLED
+        if converged:
             break
     residuals = np.vstack([rows.r for rows in parts])
     explained = np.sqrt(np.diag(parts[0].S)) / widened
     return CouplingFit(
         tuple(readings), A, free, tuple(zeros), tuple(delays), covariance, widened,
-        np.sqrt(np.mean(residuals**2, axis=0)), explained, cost,
+        np.sqrt(np.mean(residuals**2, axis=0)), explained, cost, converged,
     )  # fmt: skip
 
 

@@ -20,7 +20,7 @@ from jointscope.robots.bodies.misplaced_joints import ANGLES, LENGTHS
 from jointscope.robots.errors import RobotError
 from jointscope.robots.files.sections.pose_section import no_poses
 from jointscope.robots.geometry.arm_chain import ArmChain, ChainPoint
-from jointscope.robots.geometry.arm_effects import DRIFT, joints_misread
+from jointscope.robots.geometry.arm_effects import DRIFT
 from jointscope.robots.geometry.error_parameters import TOOL, TRACKER
 from jointscope.robots.geometry.gravity_slopes import YIELDING, gravity_slopes
 from jointscope.robots.model.robot import Robot
@@ -69,7 +69,6 @@ class SaggingArm:
             raise RobotError(no_poses(robot))
         links = [target.link for target in robot.poses.targets]
         self.chain = ArmChain(robot.tree, robot.poses.link, robot.poses.at, links)
-        self._misread = joints_misread(robot)
         self._others = sorted({*self.chain.levels} - {self.chain.level})
 
     def at(self, q: Array, e: Array, values: Mapping[str, float], turning: bool = False) -> SaggingPoint:
@@ -81,7 +80,7 @@ class SaggingArm:
             values: of all parameters.
             turning: whether derivatives shall be those of the turn of the tool, too.
         """
-        chain, parts = self.chain, WhatGivesWay(self.chain.joints, values, self._misread)
+        chain, parts = self.chain, WhatGivesWay(self.chain.joints, values)
         read = q + e + parts.waves(q)
         rigid = point = chain.at(read, values)
         last = np.zeros((*q.shape, 3))

@@ -1,23 +1,24 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """What makes an arm at rest differ from a rigid one with perfect encoders, joint by joint.
 
-    q_j = q_motor_j + sum_o (c_o cos(o q_motor_j) + s_o sin(o q_motor_j)) + e_j + x_j - sign(g_j) w_j
+    q_j = q_motor_j + r_j(q_motor_j) - a_j(q_motor_j) + e_j + x_j - sign(g_j) w_j
+    r, a = c cos(o q_motor) + s sin(o q_motor)
     k x + k3 x^3 = g,    beta = g_beta / k_beta
 
-c and s are the eccentricity of an encoder (o = 1; with the other sign where it is an effect of the catalogue, which is
-what the reading has too much) and the ripple of a gear (o waves per turn), e is what the
-transmission does unseen, g the torque of gravity, w the backlash as Neubauer et al. (2015, eq. 18) have it.
+a is the eccentricity of an encoder, what its reading has too much as in the catalogue (o = 1 unless a parameter says
+otherwise), r the ripple of a gear (o waves per turn), e is what the transmission does unseen, g the torque of gravity,
+w the backlash as Neubauer et al. (2015, eq. 18) have it.
 """
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
 
 from jointscope.robots.geometry.arm_chain import ChainPoint
-from jointscope.robots.geometry.error_parameters import BACKLASH, BEARING, CUBIC, RIPPLE, STIFFNESS, WAVES
+from jointscope.robots.geometry.error_parameters import BACKLASH, BEARING, CUBIC, RIPPLE, STIFFNESS, WAVES, WAVES_ORDER
 
 Array = NDArray[np.float64]
 ROOTS = 12  # Newton steps to the deflection of a spring that hardens
@@ -29,11 +30,10 @@ class WhatGivesWay:
     Args:
         joints: of the chain.
         values: of all parameters; those that are not there do not act.
-        misread: joints whose eccentricity is what the reading has too much.
     """
 
-    def __init__(self, joints: Sequence[str], values: Mapping[str, float], misread: Collection[str] = ()):
-        self._joints, self._values, self._misread = tuple(joints), values, misread
+    def __init__(self, joints: Sequence[str], values: Mapping[str, float]):
+        self._joints, self._values = tuple(joints), values
         self._drives = self._there(STIFFNESS)
         self._gaps = self._there(BACKLASH)
         self._bearings = {(j, axis): name for axis, part in enumerate(BEARING) for j, name in self._there(part).items()}
@@ -46,9 +46,9 @@ class WhatGivesWay:
     def waves(self, q: Array) -> Array:
         """What encoders and gears are off at angles of shape (m, n) [rad]."""
         off = np.zeros_like(q)
-        for j, (cos, sin), order in self._waves():
-            wave = self._values[cos] * np.cos(order * q[:, j]) + self._values[sin] * np.sin(order * q[:, j])
-            off[:, j] += self._sign(j, cos) * wave
+        for j, (cos, sin), sign, order in self._waves():
+            phase = self._values.get(order, 1.0) * q[:, j]
+            off[:, j] += sign * (self._values[cos] * np.cos(phase) + self._values[sin] * np.sin(phase))
         return off
 
     def deflections(self, point: ChainPoint) -> tuple[Array, Array]:
@@ -83,13 +83,12 @@ class WhatGivesWay:
         """
         found: dict[str, Array] = {}
         n = len(self._joints)
-        for j, (cos, sin), order in self._waves():
-            sign = self._sign(j, cos)
-            c, s = sign * np.cos(order * q[:, j]), sign * np.sin(order * q[:, j])
+        for j, (cos, sin), sign, order in self._waves():
+            phase = self._values.get(order, 1.0) * q[:, j]
+            c, s = sign * np.cos(phase), sign * np.sin(phase)
             parts = {cos: c, sin: s}
-            if cos.endswith(RIPPLE[0]):
-                slope = self._values[sin] * c - self._values[cos] * s
-                parts[f"{self._joints[j]}.{RIPPLE[2]}"] = q[:, j] * slope
+            if order in self._values:
+                parts[order] = q[:, j] * (self._values[sin] * c - self._values[cos] * s)
             found |= {name: by_yield[:, :, j] * part[:, None] for name, part in parts.items()}
         cubic = self._there(CUBIC)
         for j, name in self._drives.items():
@@ -104,17 +103,12 @@ class WhatGivesWay:
             found[name] = -by_yield[:, :, n * (1 + axis) + j] * tilt[:, None]
         return found
 
-    def _sign(self, j: int, name: str) -> float:
-        """Of a wave."""
-        return -1.0 if name.endswith(WAVES[0]) and self._joints[j] in self._misread else 1.0
-
-    def _waves(self) -> Iterator[tuple[int, tuple[str, str], float]]:
-        """Joint, names of both amplitudes, and waves per turn."""
-        for (cos, sin), order in ((WAVES, None), (RIPPLE[:2], RIPPLE[2])):
+    def _waves(self) -> Iterator[tuple[int, tuple[str, str], float, str]]:
+        """Joint, names of both amplitudes, sign in the angle of the joint, and name of the waves per turn."""
+        for (cos, sin), sign, order in ((WAVES, -1.0, WAVES_ORDER), (RIPPLE[:2], 1.0, RIPPLE[2])):
             there = self._there(sin)
             for j, name in self._there(cos).items():
-                times = 1.0 if order is None else self._values[f"{self._joints[j]}.{order}"]
-                yield j, (name, there[j]), times
+                yield j, (name, there[j]), sign, f"{self._joints[j]}.{order}"
 
     def _stretch(self, j: int, pull: Array) -> tuple[Array, Array]:
         """Deflection of a drive under torques, shape (m,) [rad], and its slope [rad/(N m)]."""

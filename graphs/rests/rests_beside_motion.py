@@ -7,6 +7,7 @@ the Gaussian that is left of the estimate without them, and the bands are integr
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -15,12 +16,40 @@ from jointscope.factors.calibration import DYNAMICS
 from jointscope.graphs.calibration.calibration_result import CalibrationResult
 from jointscope.graphs.calibration.found_values import AT_BOUND, derived_results
 from jointscope.graphs.rests.band_posterior import band_posterior
+from jointscope.graphs.rests.calibrate_rests import settled_rests
 from jointscope.graphs.rests.doubts import AskedOfRests
 from jointscope.graphs.rests.rest_errors import rest_errors
 from jointscope.graphs.rests.rest_set import RestSet
 from jointscope.graphs.rests.rests_by_values import SaidElsewhere
 from jointscope.graphs.rests.seen_rests import SeenRests
+from jointscope.graphs.solving.batch_solver import Progress
+from jointscope.graphs.starts.spring_knots import with_knots
+from jointscope.robots.model.robot import Robot
 from jointscope.robots.parts.parameter import with_sigmas
+from jointscope.robots.recordings.recording import Recording
+from jointscope.robots.rests.rests import Rests
+
+
+def weighted_rests(
+    robot: Robot, recordings: Sequence[Recording], rests: Sequence[Rests], progress: Progress
+) -> tuple[Robot, list[RestSet]]:
+    """Rests for an estimate with motion, each with the weight that it deserves, and the robot of both.
+
+    Knots of springs lie where motion or rests deflect them: both must have the same, or one slope would be two.
+
+    Args:
+        robot: with start values.
+        recordings: of motion.
+        rests: of each recording; nothing is done without any.
+        progress: called with a text and the share done.
+
+    Raises:
+        SolveError: as of `settled_rests`.
+    """
+    if not rests:
+        return robot, []
+    robot = with_knots(robot, [*recordings, *rests])
+    return robot, settled_rests(robot, rests, progress)[0]
 
 
 def with_rests(result: CalibrationResult) -> CalibrationResult:

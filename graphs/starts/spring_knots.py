@@ -66,7 +66,7 @@ def deflections_of(robot: Robot, seen: Iterable[Array]) -> dict[str, dict[str, f
 
 
 def _pair(robot: Robot, recording: Recording | Rests) -> Pair | None:
-    """What encoders read at the same times, but in stretches left out; None without encoders on the links."""
+    """What encoders read at the same times but in stretches left out, zeros taken off; None without link encoders."""
     if isinstance(recording, Rests):
         return None if recording.q_link is None else (recording.q_motor, recording.q_link)
     if robot.link_encoder is None:

@@ -25,7 +25,6 @@ from jointscope.robots.geometry.error_parameters import (
     TORQUE_SHARE,
     WAVES,
 )
-from jointscope.robots.model.robot import Robot
 
 POSES, FREQUENCY = "poses", "frequency"
 DRIFT = tuple(f"tracker.tracker_drift.{axis}" for axis in "xyz")
@@ -146,8 +145,3 @@ def effect_units(joints: Sequence[str]) -> dict[str, str]:
     """Unit of every parameter of every effect, by full name."""
     units = {n: kind.unit for kind in KINDS for joint in joints for n in kind.parameters(joint)}
     return units | {f"{joint}.{RIPPLE[2]}": "1" for joint in joints}
-
-
-def joints_misread(robot: Robot) -> frozenset[str]:
-    """Joints whose eccentricity is an effect of the catalogue: what the reading has too much, not what it lacks."""
-    return frozenset(here.owner for here in robot.effects if here.effect.id == "encoder_eccentricity")

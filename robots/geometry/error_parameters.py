@@ -15,7 +15,8 @@ from jointscope.robots.parts.parameter import Parameter
 
 TRACKER, TOOL = "tracker", "tool"
 BACKLASH = "backlash"
-WAVES = ("encoder_eccentricity.cos", "encoder_eccentricity.sin")  # of an encoder's error, once per turn
+WAVES = ("encoder_eccentricity.cos", "encoder_eccentricity.sin")  # of what an encoder reads too much
+WAVES_ORDER = "encoder_eccentricity.order"  # periods per turn of the joint; one where it is no parameter
 RIPPLE = ("gear_ripple.cos", "gear_ripple.sin", "gear_ripple.order")  # of a gear's error, `order` times per turn
 STIFFNESS = "stiffness"  # of a drive
 CUBIC = "spring_cubic.stiffness"  # of a drive that hardens

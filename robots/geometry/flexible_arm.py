@@ -22,7 +22,6 @@ from numpy.typing import NDArray
 from jointscope.robots.bodies.equations_of_motion import FreeEquations
 from jointscope.robots.bodies.misplaced_joints import across, misplaced, turned
 from jointscope.robots.errors import RobotError
-from jointscope.robots.geometry.arm_effects import joints_misread
 from jointscope.robots.geometry.error_parameters import (
     BEARING,
     DAMPING,
@@ -88,7 +87,6 @@ class FlexibleArm:
     Attributes:
         joints: whose motors are shaken.
         springs: of drives and bearings, in the order of x.
-        misread: joints whose eccentricity is what the reading has too much.
 
     Raises:
         RobotError: a joint that is shaken does not turn.
@@ -99,7 +97,7 @@ class FlexibleArm:
         slide = next((joint for joint in robot.frequency.joints if robot.tree.is_slide(joint)), None)
         if slide is not None:
             raise RobotError(f"{robot.path.name}: frequency.joints: {slide} slides; expected joints that turn")
-        self._tree, self.joints, self.misread = robot.tree, robot.frequency.joints, joints_misread(robot)
+        self._tree, self.joints = robot.tree, robot.frequency.joints
         self._target = None if robot.poses is None else (robot.poses.link, robot.poses.at)
         springs: list[Spring] = []
         model, parameters = robot.tree.model, robot.parameters

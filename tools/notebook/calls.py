@@ -18,14 +18,14 @@ from jointscope.graphs.discovery.discovery_result import SavedStep
 from jointscope.graphs.discovery.side_by_side import SideBySide
 from jointscope.graphs.joint_kinds.arm_graph import ArmCalibration, arm_graph
 from jointscope.graphs.joint_kinds.beside_motion import calibrate_beside_motion
-from jointscope.graphs.rests.rests_beside_motion import with_rests
+from jointscope.graphs.rests.rests_beside_motion import weighted_rests, with_rests
 from jointscope.graphs.solving.batch_solver import Progress, Solver, solve
 from jointscope.graphs.solving.set_problem import SetProblem
 from jointscope.graphs.transmission.calibrate_links import calibrate_links
 from jointscope.graphs.transmission.compare_links import compare_links
 from jointscope.graphs.transmission.diagnose_links import diagnose_links
 from jointscope.graphs.transmission.discover_links import discover_links
-from jointscope.robots.errors import RecordingError, SolveError
+from jointscope.robots.errors import RecordingError, RobotError, SolveError
 from jointscope.tools.acceptance.evaluation import check_models
 from jointscope.tools.bags.needed_streams import check_same_streams
 from jointscope.tools.bags.read_locked import read_coupling
@@ -41,11 +41,13 @@ from jointscope.tools.notebook.given import (
     to_learn_from,
     without_stretches,
 )
+from jointscope.tools.notebook.kinds_calls import AnyPoses, AnyRests, AnyShaken, Still, diagnosed, discovered
+from jointscope.tools.notebook.kinds_results import KindsDiagnosed, KindsDiscovered
 from jointscope.tools.notebook.results import Calibrated, Compared, Diagnosed, Discovered
 from jointscope.tools.verb_parts.frequency_runs import read_all_shaken
 from jointscope.tools.verb_parts.named_recordings import diagnosis_of, discovery_of
 from jointscope.tools.verb_parts.pose_runs import weighted_poses
-from jointscope.tools.verb_parts.rest_runs import weighted_rests
+from jointscope.tools.verb_parts.rest_runs import read_all_rests
 from jointscope.tools.verdicts.judgement import judge
 
 
@@ -105,7 +107,7 @@ def calibrate(
     else:
         report, paths = progress or _quiet, [[Path(path) for path in each] for each in (rests, poses, frequency)]
         placed, at_poses = weighted_poses(model, paths[1], report)
-        placed, at_rest = weighted_rests(placed, paths[0], read_ones, report)
+        placed, at_rest = weighted_rests(placed, read_ones, read_all_rests(paths[0], placed, report), report)
         all_sets = [*sets, *at_rest, *at_poses]
         options: dict[str, Any] = {"biases_only": biases_only, "solver": solver, "sets": all_sets, "progress": progress}
         shaken = read_all_shaken(placed, paths[2], report)
@@ -154,18 +156,31 @@ def diagnose(
     recordings: AnyRecording | Sequence[AnyRecording],
     holdout: AnyRecording | None = None,
     *,
+    rests: AnyRests = (),
+    poses: AnyPoses = (),
+    frequency: AnyShaken = (),
+    holdout_rests: AnyRests = (),
+    holdout_poses: AnyPoses = (),
+    holdout_frequency: AnyShaken = (),
     leave_out: AnyStretches = (),
     missing_torque: bool = True,
     accept: AnyLimits = (),
     side_by_side: SideBySide | None = None,
     progress: Progress | None = None,
-) -> Diagnosed:
+) -> Diagnosed | KindsDiagnosed:
     """Ranks the physical effects that a model may lack, each with its evidence.
 
     Args:
         robot: is calibrated first.
-        recordings: to learn from; candidates are judged on blocks of them that their fits leave out.
+        recordings: of motion, to learn from; [] where there are rests and poses, say. Candidates are judged on blocks
+            that their fits leave out.
         holdout: is scored and reported, and never chooses.
+        rests: bags in which the robot stands: every kind is asked, each in its own graph (docs/frequency.md).
+        poses: tables or bags of the arm at rest with a measured target.
+        frequency: bags in which the arm is shaken, one for each pose.
+        holdout_rests: rests that are scored and never choose.
+        holdout_poses: poses of that sort.
+        holdout_frequency: frequency responses of that sort.
         leave_out: stretches in which something acted that does not belong to the robot: (t0, t1) [s] of the only
             recording, or "BAG:T0:T1" as on the command line.
         missing_torque: estimate the torque that the model lacks, for the pictures.
@@ -178,6 +193,14 @@ def diagnose(
         SolveError: the base model cannot be calibrated.
     """
     given = robot_of(robot)
+    still = Still(rests, poses, frequency, Still(holdout_rests, holdout_poses, holdout_frequency))
+    if still.some:
+        if accept:
+            raise RobotError(
+                "accept: limits do not apply to a diagnosis of several kinds; calibrate takes them with all"
+            )
+        asked: dict[str, Any] = {"missing_torque": missing_torque, "side_by_side": side_by_side}
+        return diagnosed(given, recordings, holdout, still, leave_out, progress, **asked)
     limits = limits_of(accept, [given])
     model, learnt, held = to_learn_from(given, recordings, holdout, leave_out)
     if model.free_links:
@@ -195,19 +218,32 @@ def discover(
     recordings: AnyRecording | Sequence[AnyRecording],
     holdout: AnyRecording | None = None,
     *,
+    rests: AnyRests = (),
+    poses: AnyPoses = (),
+    frequency: AnyShaken = (),
+    holdout_rests: AnyRests = (),
+    holdout_poses: AnyPoses = (),
+    holdout_frequency: AnyShaken = (),
     leave_out: AnyStretches = (),
     missing_torque: bool = True,
     save: Save | None = None,
     resume: Sequence[SavedStep] | None = None,
     side_by_side: SideBySide | None = None,
     progress: Progress | None = None,
-) -> Discovered:
+) -> Discovered | KindsDiscovered:
     """Calibrates, diagnoses, adds what is missing, and repeats until nothing helps.
 
     Args:
         robot: the base model.
-        recordings: to learn from; candidates are judged on blocks of them that their fits leave out.
+        recordings: of motion, to learn from; [] where there are rests and poses, say. Candidates are judged on blocks
+            that their fits leave out.
         holdout: is scored once per step, and never chooses.
+        rests: bags in which the robot stands: one model is grown by every kind (docs/frequency.md).
+        poses: tables or bags of the arm at rest with a measured target.
+        frequency: bags in which the arm is shaken, one for each pose.
+        holdout_rests: rests that are scored and never choose.
+        holdout_poses: poses of that sort.
+        holdout_frequency: frequency responses of that sort.
         leave_out: stretches in which something acted that does not belong to the robot: (t0, t1) [s] of the only
             recording, or "BAG:T0:T1" as on the command line.
         missing_torque: estimate the torque that each model lacks, for the pictures.
@@ -220,6 +256,12 @@ def discover(
         RecordingError: a recording cannot be a measurement of this robot.
         SolveError: the base model cannot be calibrated.
     """
+    still = Still(rests, poses, frequency, Still(holdout_rests, holdout_poses, holdout_frequency))
+    if still.some:
+        if save is not None or resume is not None:
+            raise RecordingError("save, resume: a search over several kinds keeps no steps; leave them out")
+        asked = {"missing_torque": False, "side_by_side": side_by_side}
+        return discovered(robot, recordings, holdout, still, leave_out, progress, **asked)
     model, learnt, held = to_learn_from(robot, recordings, holdout, leave_out)
     options: dict[str, Any] = {"save": save, "resume": resume, "progress": progress}
     if model.free_links:

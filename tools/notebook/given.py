@@ -7,6 +7,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from numbers import Real
 from pathlib import Path
 
+from jointscope.graphs.across_kinds.discover_kinds import KindsDiscovery
 from jointscope.graphs.calibration.calibration_result import CalibrationResult
 from jointscope.graphs.discovery.discovery_result import Discovery
 from jointscope.robots.errors import RecordingError, RobotError
@@ -18,7 +19,7 @@ from jointscope.tools.bags.read_recording import read_recording
 from jointscope.tools.presentation.left_out import leave_out as leave_out_texts
 from jointscope.tools.simulator.simulation import Simulation
 
-AnyRobot = Robot | CalibrationResult | Discovery | str | Path
+AnyRobot = Robot | CalibrationResult | Discovery | KindsDiscovery | str | Path
 AnyRecording = Recording | Simulation | str | Path
 AnyStretches = Sequence[tuple[float, float] | str]
 AnyLimits = str | Path | Sequence[Limit]
@@ -30,7 +31,7 @@ def robot_of(robot: AnyRobot) -> Robot:
     Raises:
         RobotError: there is none of that name, or its file has a mistake.
     """
-    if isinstance(robot, CalibrationResult | Discovery):
+    if isinstance(robot, CalibrationResult | Discovery | KindsDiscovery):
         return robot.robot
     if not isinstance(robot, Robot | str | Path):
         raise RobotError(f"expected a robot, a result that has one, a name or a path, got {_told(robot)}")

@@ -35,7 +35,7 @@ TOLD = 12  # candidates in a figure
 FEW_DECADES = 100.0  # of a logarithmic axis that has room for ticks between them
 
 
-class _Found(Shown):
+class Found(Shown):
     """Made from a result of the computation."""
 
     @classmethod
@@ -45,7 +45,7 @@ class _Found(Shown):
 
 
 @dataclass(frozen=True, kw_only=True, repr=False)
-class _Limited(_Found):
+class _Limited(Found):
     """A result that may be held against limits.
 
     Attributes:
@@ -195,7 +195,7 @@ class Diagnosed(_Limited, Diagnosis):
 
 
 @dataclass(frozen=True, repr=False)
-class Discovered(_Found, Discovery):
+class Discovered(Found, Discovery):
     """The way to a model that lacks nothing, step by step; `robot` is the last one."""
 
     def answer(self) -> str:
@@ -226,7 +226,7 @@ class Discovered(_Found, Discovery):
 
 
 @dataclass(frozen=True, repr=False)
-class Replayed(_Found, ReplayResult):
+class Replayed(Found, ReplayResult):
     """The estimator over a recording."""
 
     @cached_property
@@ -260,7 +260,7 @@ class Replayed(_Found, ReplayResult):
 
 
 @dataclass(frozen=True, repr=False)
-class Simulated(_Found, Simulation):
+class Simulated(Found, Simulation):
     """A simulated recording and its truth."""
 
     def answer(self) -> str:

@@ -11,6 +11,8 @@ from itertools import accumulate
 from pathlib import Path
 from typing import Any
 
+from jointscope.graphs.across_kinds.discover_kinds import KindsDiscovery
+from jointscope.graphs.across_kinds.kinds_recordings import KindsRecordings
 from jointscope.graphs.calibration.calibration_result import CalibrationResult
 from jointscope.graphs.comparison.comparison_result import ComparisonResult
 from jointscope.graphs.discovery.diagnosis_result import Diagnosis
@@ -156,6 +158,8 @@ def _recorded_files(found: Any) -> list[str]:
         paths = [found.recording.path]
     elif isinstance(found, Diagnosis | Discovery):
         paths = [recording.path for recording in (*found.recordings, found.heldout) if recording is not None]
+    elif isinstance(getattr(found, "given", None), KindsRecordings):
+        paths = [*found.given.paths, *found.held.paths]
     else:
         paths = [found.source.path] if isinstance(found, ReplayResult) else []
     return [path for path in paths if path]
@@ -169,4 +173,6 @@ def _robot_files(found: Any) -> list[Path]:
         return [model.robot.path for model in found.models]
     if isinstance(found, Discovery):
         return [found.steps[0].robot.path]
+    if isinstance(found, KindsDiscovery):
+        return [found.steps[0].model.robot.path]
     return [found.robot.path] if isinstance(found, Diagnosis | ReplayResult) else []

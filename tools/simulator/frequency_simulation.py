@@ -218,7 +218,7 @@ def _recording(
     for effect in effects:
         if effect.id == "encoder_eccentricity":
             i = robot.joints.index(effect.owner)
-            q[:, i] -= effect.parameters["cos"] * np.cos(q[:, i]) + effect.parameters["sin"] * np.sin(q[:, i])
+            q[:, i] += effect.parameters["cos"] * np.cos(q[:, i]) + effect.parameters["sin"] * np.sin(q[:, i])
         if effect.id == "torque_constant_error" and effect.owner in shaken:
             torques[:, shaken.index(effect.owner)] /= 1.0 + effect.parameters["share"]
         if effect.id == "torque_delay":

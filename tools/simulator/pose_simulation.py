@@ -178,10 +178,10 @@ class _Arm:
         return sites, torques
 
     def _waves(self, joint: str, angle: float) -> float:
-        """What encoder and gear are off at an angle of the motor [rad]."""
+        """By how much a joint is ahead of its reading [rad]: what the gear does, less what the encoder has too much."""
         cos, sin = (self._bodies.size("encoder_eccentricity", joint, part) for part in ("cos", "sin"))
         size, order, phase = (self._bodies.size("gear_ripple", joint, part) for part in ("amplitude", "order", "phase"))
-        return float(cos * np.cos(angle) + sin * np.sin(angle) + size * np.cos(order * angle + phase))
+        return float(size * np.cos(order * angle + phase) - cos * np.cos(angle) - sin * np.sin(angle))
 
     def _deflection(self, joint: str, pull: float) -> float:
         """How far a drive gives way under a torque [rad]: the root of k x + k3 x^3 = pull, and half a gap."""

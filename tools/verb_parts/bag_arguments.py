@@ -13,7 +13,6 @@ from jointscope.robots.recordings.recording import Recording
 from jointscope.tools.presentation.left_out import add_leave_out_option, leave_out
 from jointscope.tools.terminal.progress import Progress, reading
 from jointscope.tools.verb_parts.pose_runs import check_one_kind
-from jointscope.tools.verb_parts.rest_runs import check_held_out_rests
 from jointscope.tools.verb_parts.user_effects import add_effects_option
 
 KINDS = {
@@ -95,15 +94,25 @@ def check_kind(args: argparse.Namespace) -> None:
         "--scheduler": args.scheduler is not None,
         "--workers": args.workers > 1,
     }
-    check_held_out_rests(args)
+    for kind in KINDS:
+        _check_held_out(f"--{kind}", getattr(args, kind), getattr(args, f"holdout_{kind}"))
     check_one_kind(args.bags, args.poses, args.rests, of_motion, args.frequency)
-    if args.holdout_poses and not args.poses:
-        raise RecordingError("--holdout-poses goes with --poses")
-    if args.holdout_frequency and not args.frequency:
-        raise RecordingError("--holdout-frequency goes with --frequency")
-    twice = next((path for path in args.holdout_frequency if path in args.frequency), None)
-    if twice is not None:
-        raise RecordingError(f"{twice} is given with --frequency and held out; leave it out once")
+
+
+def _check_held_out(option: str, given: Sequence[Path], held: Sequence[Path]) -> None:
+    """Recordings of a kind that are held out go with others, and are none of these; not even a copy.
+
+    Raises:
+        RecordingError: there are no others, or one is the same.
+    """
+    from jointscope.tools.bags.messages.open_bag import bag_sha256
+
+    if held and not given:
+        raise RecordingError(f"--holdout-{option[2:]} goes with {option}")
+    contents = {bag_sha256(path) for path in given if path.exists()} if held else set[str]()
+    for path in held:
+        if path in given or (path.exists() and bag_sha256(path) in contents):
+            raise RecordingError(f"{path} is given with {option} and held out; leave it out once")
 
 
 def read_bags(args: argparse.Namespace, robot: Robot, progress: Progress) -> tuple[list[Recording], Recording | None]:

@@ -3,14 +3,12 @@
 
 from __future__ import annotations
 
-import argparse
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from jointscope.robots.errors import RecordingError
 from jointscope.robots.model.robot import Robot
 from jointscope.robots.rests.rests import Rests
 from jointscope.tools.acceptance.evaluation import AcceptedBy
@@ -23,20 +21,6 @@ from jointscope.tools.writing.origin import made_from, other_kinds
 
 if TYPE_CHECKING:
     from jointscope.graphs.locked_springs.coupling import Coupling
-    from jointscope.robots.recordings.recording import Recording
-
-
-def check_held_out_rests(args: argparse.Namespace) -> None:
-    """Held-out rests go with others.
-
-    Raises:
-        RecordingError: a recording twice, or none that the held-out ones go with.
-    """
-    if args.holdout_rests and not args.rests:
-        raise RecordingError("--holdout-rests goes with --rests")
-    twice = next((path for path in args.holdout_rests if path in args.rests), None)
-    if twice is not None:
-        raise RecordingError(f"{twice} is given with --rests and held out; leave it out once")
 
 
 def read_all_rests(paths: Sequence[Path], robot: Robot, progress: Progress) -> list[Rests]:
@@ -215,23 +199,6 @@ def _with_rests_json(result: Any) -> dict[str, Any]:
         "cost": rests["cost"],
         "wall_seconds": result.wall_seconds,
     }
-
-
-def weighted_rests(
-    robot: Robot, paths: Sequence[Path], motions: Sequence[Recording], progress: Progress
-) -> tuple[Robot, list[Any]]:
-    """Rests for an estimate with motion, each with the weight that it deserves, and the robot; none without paths.
-
-    Knots of the robot's springs lie where any of the recordings deflects them.
-    """
-    if not paths:
-        return robot, []
-    from jointscope.graphs.rests.calibrate_rests import settled_rests
-    from jointscope.graphs.starts.spring_knots import with_knots
-
-    rests = read_all_rests(paths, robot, progress)
-    robot = with_knots(robot, [*motions, *rests])
-    return robot, list(settled_rests(robot, rests, progress)[0])
 
 
 def compare_rests(robots: Mapping[str, Robot], paths: Sequence[Path], progress: Progress) -> tuple[str, dict[str, Any]]:

@@ -58,6 +58,7 @@ def run(args: argparse.Namespace) -> int:
     load_user_effects(args.effects)
     from jointscope.robots.files.robot_file import load_robot
     from jointscope.tools.notebook.calls import diagnose
+    from jointscope.tools.notebook.results import Diagnosed
     from jointscope.tools.terminal.diagnosis_text import diagnosis_text
 
     robot = load_robot(args.robot)
@@ -97,6 +98,7 @@ def run(args: argparse.Namespace) -> int:
             side_by_side=workers,
             progress=progress,
         )
+        assert isinstance(result, Diagnosed)  # of motion alone
         if files.pictures:
             progress("writing", 1.0)
         result.write(files)

@@ -103,6 +103,7 @@ def _discover(
 ) -> Any:
     """The computation; whatever ends it, finished steps stay on disk."""
     from jointscope.tools.notebook.calls import discover
+    from jointscope.tools.notebook.results import Discovered
     from jointscope.tools.verb_parts.discovery_state import DiscoveryState, hashes_of
 
     recordings, holdout = given
@@ -126,4 +127,5 @@ def _discover(
         if not state.count:
             raise
         raise JointscopeError(f"interrupted after step {state.count - 1}; the same command continues there") from None
+    assert isinstance(result, Discovered)  # of motion alone
     return replace(result, robot_file=str(args.output))

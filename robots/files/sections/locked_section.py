@@ -97,7 +97,9 @@ def recording_name(path: str | Path) -> str:
 
 
 def _content(robot: Robot) -> Any:
-    return robot.document.get(KEY) if robot.document is not None else None
+    content = robot.document.get(KEY) if robot.document is not None else None
+    # a name of digits alone is a number in YAML
+    return {str(name): joints for name, joints in content.items()} if isinstance(content, dict) else content
 
 
 def _in_order(robot: Robot, joints: Any) -> tuple[str, ...]:

@@ -197,12 +197,14 @@ def test_an_eccentric_encoder_is_one_number_with_one_sign_for_motion_and_poses(s
     sizes = {"cos": (3e-4, 1e-6, "rad"), "sin": (-2e-4, 1e-6, "rad")}
     grown = with_shared_effect(seen, across(wave.label, poses=Said("missing", sizes), motion=Said("absent", {})), wave)
     assert grown.has_effect("encoder_eccentricity", "swing")
-    poses = sighted(seen, 30, "poses", "encoder_eccentricity@swing:cos=-3e-4,sin=2e-4")  # what is added to readings
+    poses = sighted(seen, 30, "poses", "encoder_eccentricity@swing:cos=3e-4,sin=-2e-4")
     _, (problem,) = placed(grown, [poses])
     assert whitened(grown, grown.poses, [problem]) < 1.3 < 5.0 < whitened(seen, seen.poses, [problem])
+    grown = grown.with_values({"swing.encoder_eccentricity.order": 3.0})
+    problem = problem.of_robot(grown)
     calibration = problem.start(Calibration.of(grown))[1]
     point, size = problem.point(calibration), 1e-7
-    for name in ("cos", "sin"):
+    for name in ("cos", "sin", "order"):
         full = f"swing.encoder_eccentricity.{name}"
         value = grown.parameters[full].value
         ends = [

@@ -15,7 +15,7 @@ from jointscope.graphs.frequency.stages import first_stage, next_stage, with_col
 from jointscope.robots.files.robot_file import load_robot
 from jointscope.robots.geometry.added_effect import RIGID, at_null, with_effect
 from jointscope.robots.geometry.arm_effects import KINDS, ArmHypothesis
-from jointscope.robots.geometry.flexible_arm import LOSS, FlexibleArm
+from jointscope.robots.geometry.flexible_arm import LOSS
 
 BY_ID = {kind.id: kind for kind in KINDS}
 SMALL = {  # sizes at which the balance is still linear in them
@@ -86,7 +86,7 @@ def test_the_column_of_an_eccentric_encoder_is_what_it_does_beside_the_offset_th
     columns = with_columns(base, at_null(robot, [hypothesis])).stage.geometry
     for name, wave in zip(hypothesis.names, (np.cos, np.sin), strict=True):
         there = with_effect(robot, hypothesis, {n: size if n == name else 0.0 for n in hypothesis.names})
-        there = there.with_values({"joint2.offset": -size * float(wave(pose.q[1]))})
+        there = there.with_values({"joint2.offset": size * float(wave(pose.q[1]))})
         moved = balance(settled(there, pose, 3)) - balance(settled(robot, pose, 3))
         assert np.linalg.norm(moved - size * columns[name]) < 0.1 * np.linalg.norm(moved)
 
@@ -123,17 +123,27 @@ def test_a_soft_locked_joint_changes_the_balance_by_its_compliance_at_first(robo
     np.testing.assert_allclose(change * k, slope, rtol=0.02, atol=0.02 * np.abs(slope).max())
 
 
-def test_an_eccentricity_of_the_catalogue_is_the_same_with_the_other_sign(robot, pose):
-    hypothesis = effect("encoder_eccentricity@joint2")
-    problem = settled(with_effect(robot, hypothesis, dict(zip(hypothesis.names, (1e-3, -2e-3), strict=True))), pose)
-    values, x, sharpness = problem.stage.values, problem.stage.x, problem.sharpness(problem.stage.values)
-    misread = FlexibleArm(problem.robot)
-    misread.misread = frozenset({"joint2"})
-    added = motor_effects(problem.arm, problem.pose, values, sharpness, x)
-    turned = {n: -value if n in hypothesis.names else value for n, value in values.items()}
-    read = motor_effects(misread, problem.pose, turned, sharpness, x)
-    np.testing.assert_allclose(read.offset, added.offset)
-    np.testing.assert_allclose(read.torque, added.torque)
-    for name in hypothesis.names:
-        np.testing.assert_allclose(read.waves[name][1], -added.waves[name][1])
-        np.testing.assert_allclose(read.waves[name][2], -added.waves[name][2])
+def test_an_eccentric_encoder_of_a_motor_has_as_many_periods_per_turn_as_its_parameter_says(robot, pose):
+    """A gear's ripple of the other sign is what moves the link alike; only the rotor moves with the encoder."""
+    wave, ripple = effect("encoder_eccentricity@joint3"), effect("gear_ripple@joint3")
+    sizes, name = (1e-3, -2e-3), "joint3.encoder_eccentricity.order"
+    eccentric = with_effect(robot, wave, dict(zip(wave.names, sizes, strict=True)))
+    problem = settled(eccentric, pose)
+    values, x, sharpness = dict(problem.stage.values), problem.stage.x, problem.sharpness(problem.stage.values)
+
+    def effects(**more):
+        return motor_effects(problem.arm, problem.pose, {**values, **more}, sharpness, x)
+
+    once, twenty = effects(), effects(**{name: 20.0})
+    np.testing.assert_allclose(effects(**{name: 1.0}).offset, once.offset)
+    plain = {n: v for n, v in values.items() if n not in wave.names}
+    other = plain | {n: -v for n, v in zip(ripple.names, sizes, strict=True)} | {"joint3.gear_ripple.order": 20.0}
+    geared = motor_effects(problem.arm, problem.pose, other, sharpness, x)
+    np.testing.assert_allclose(twenty.offset, geared.offset, rtol=1e-9, atol=1e-15)
+    assert np.abs(twenty.offset - once.offset).max() > 0.1 * np.abs(once.offset).max()
+    step = 1e-4
+    ends = [effects(**{name: 20.0 + sign * step}) for sign in (1.0, -1.0)]
+    i, by_offset, by_torque = twenty.waves[name]
+    for slope, part in ((by_offset, "offset"), (by_torque, "torque")):
+        expected = (getattr(ends[0], part) - getattr(ends[1], part))[:, :, i] / (2.0 * step)
+        np.testing.assert_allclose(slope, expected, atol=1e-5 * np.abs(expected).max())

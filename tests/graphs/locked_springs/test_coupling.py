@@ -97,6 +97,29 @@ def test_one_locked_spring_shows_its_rope_and_leaves_the_others_of_the_file():
     assert coupling.matrix[3, 2] == pytest.approx(BIOROB_T[3, 2], abs=4.0 * coupling.sigmas[3, 2])
 
 
+def test_a_spring_that_is_locked_in_two_groups_of_recordings_has_what_the_longer_ones_say():
+    plain = replace(BIOROB, transmission=None)
+    late = readings(BIOROB, 1, joints=("joint4",), seconds=60.0)
+    alone, both = find_coupling(plain, [late]), find_coupling(plain, [readings(BIOROB), late])
+    first = find_coupling(plain, [readings(BIOROB)])
+    np.testing.assert_allclose(both.matrix[:3, :3], first.matrix[:3, :3])
+    # the row of joint 4 in A = T^-1, which the angles of joints 1 to 3 come into when it is turned round
+    np.testing.assert_allclose(np.linalg.inv(both.matrix)[3], np.linalg.inv(alone.matrix)[3], atol=1e-12)
+    assert both.sigmas[3, 3] == pytest.approx(alone.sigmas[3, 3], rel=1e-6) and both.sigmas[3, 3] < first.sigmas[3, 3]
+    for at, value in BIOROB_T.items():
+        assert both.matrix[at] == pytest.approx(value, abs=4.0 * both.sigmas[at])
+    other = find_coupling(plain, [late, readings(BIOROB)])
+    np.testing.assert_array_equal(other.matrix, both.matrix)
+    np.testing.assert_array_equal(other.sigmas, both.sigmas)
+
+
+def test_a_matrix_that_did_not_converge_is_no_result(monkeypatch):
+    monkeypatch.setattr("jointscope.graphs.locked_springs.coupling_matrix.ROUNDS", 1)
+    monkeypatch.setattr("jointscope.graphs.locked_springs.coupling_matrix.WIDENINGS", 0)
+    with pytest.raises(RecordingError, match=r"bench: no matrix between motors and links was found \(no convergence\)"):
+        find_coupling(replace(BIOROB, transmission=None), [readings(BIOROB)])
+
+
 def test_a_wrong_coupling_of_an_effect_stays_one_of_the_effect():
     plain = with_matrix(BIOROB, {at: value for at, value in BIOROB_T.items() if at != (3, 2)})
     robot = replace(

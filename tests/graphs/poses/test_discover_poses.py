@@ -106,7 +106,7 @@ HIDDEN = (
     *(f"gear_ripple@joint{j}:amplitude=8e-5,order={n}" for j, n in ((1, 45), (2, 96), (3, 96))),
     *(f"joint_elasticity@joint{j}:compliance=4e-5" for j in (4, 5, 6)),
     *(f"spring_cubic@joint{j}:stiffness=4e10" for j in (2, 3)),
-    *(f"encoder_eccentricity@joint{j}:cos=1e-4,sin=1e-4" for j in (2, 4)),
+    *(f"encoder_eccentricity@joint{j}:cos=-1e-4,sin=-1e-4" for j in (2, 4)),
 )
 
 

@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 from lever_bench import hanging, lever
 
+from jointscope.graphs.rests.rests_beside_motion import weighted_rests
 from jointscope.graphs.starts.spring_knots import with_knots
 from jointscope.robots.files.effect_editing import add_effect, remove_effect
 from jointscope.robots.recordings.recording import Recording, Stream
-from jointscope.tools.verb_parts import rest_runs
 
 KNOTS = ("swing.spring_pieces_2.forward", "swing.spring_pieces_2.backward")
 
@@ -74,14 +74,20 @@ def test_zeros_of_encoders_and_what_is_left_out_move_no_knots(with_pieces):
     np.testing.assert_allclose(values, [bend.max(), -bend.min()], rtol=1e-6)
 
 
-def test_rests_beside_motion_have_the_knots_of_all_recordings_held(with_pieces, monkeypatch):
-    rests = hanging(20, 1)
-    monkeypatch.setattr(rest_runs, "read_all_rests", lambda paths, robot, progress: [rests])
-    q = np.sin(0.05 * np.arange(400))
-    far = 1.5 * np.max(np.abs(rests.q_link - rests.q_motor))
-    robot, sets = rest_runs.weighted_rests(with_pieces, ["bench"], [moving(q + far * q, q)], lambda text, share: None)
-    knots = {name: robot.parameters[name] for name in KNOTS}
-    np.testing.assert_allclose([p.value for p in knots.values()], [far, far], rtol=0.01)
-    assert all(p.fixed for p in knots.values())
-    assert {name: sets[0].robot.parameters[name] for name in KNOTS} == knots
-    assert not {*KNOTS} & {*sets[0].model.names}
+def test_motion_and_rests_in_one_graph_have_the_same_knots(with_pieces):
+    rests = hanging(40, 1)
+    d, (motor, link) = rests.q_link - rests.q_motor, with_pieces.sensors
+    t = np.linspace(0.0, 5.0, 501)
+    q_motor = np.sin(t)[:, None]
+    deflection = 0.5 * d.max() * np.sin(3.0 * t)[:, None]  # less than at rest to one side, more or less to the other
+    streams = {
+        motor: Stream(motor, t, q_motor, ("swing.motor_position",), "rad"),
+        link: Stream(link, t, q_motor + deflection, ("swing.link_position",), "rad"),
+    }
+    moves = Recording("moves", "", 0, streams)
+    robot, (problem,) = weighted_rests(with_pieces, [moves], [rests], lambda text, share: None)
+    expected = [d.max(), max(-d.min(), -deflection.min())]
+    for each in (robot, problem.robot, with_knots(robot, [moves])):  # a calibration of the motion leaves them there
+        np.testing.assert_allclose([each.parameters[name].value for name in KNOTS], expected, rtol=1e-3)
+        assert all(each.parameters[name].fixed for name in KNOTS)
+    assert weighted_rests(with_pieces, [moves], [], lambda text, share: None) == (with_pieces, [])

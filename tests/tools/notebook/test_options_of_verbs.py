@@ -34,7 +34,6 @@ SHELL_ONLY = {
     **dict.fromkeys(("report", "figures", "rrd", "json"), RESULT),
     "effects": CATALOGUE,
     "holdout_share": BETWEEN,
-    **dict.fromkeys(("holdout_poses", "holdout_frequency", "holdout_rests"), OTHER_KIND),
 }
 SHELL_ONLY_OF = {
     "add": {"output": RESULT},
@@ -45,11 +44,7 @@ SHELL_ONLY_OF = {
         **dict.fromkeys(("workers", "scheduler"), "`solver=` takes one that spreads"),
     },
     "compare": dict.fromkeys(("poses", "rests", "frequency"), OTHER_KIND),
-    "diagnose": dict.fromkeys(("poses", "rests", "frequency"), OTHER_KIND),
-    "discover": {
-        "output": "`save=` is called after each step",
-        **dict.fromkeys(("poses", "rests", "frequency"), OTHER_KIND),
-    },
+    "discover": {"output": "`save=` is called after each step"},
     "info": {"locked_springs": "`tools.bags.read_locked.read_coupling([bag], robot)` gives the matrix as an object"},
     "replay": {"output": RESULT, **dict.fromkeys(("batch", "live", "speed"), NO_TERMINAL)},
     "simulate": {

@@ -6,6 +6,7 @@ from __future__ import annotations
 import json
 import re
 import shlex
+import shutil
 from dataclasses import replace
 from pathlib import Path
 
@@ -93,6 +94,14 @@ def test_a_recording_with_locked_springs_is_no_motion_and_no_rest(words, capsys)
     told = "bench.mcap: locked_springs of named.yaml says that springs were locked there, so it is no recording of the"
     assert complaint(capsys, "calibrate", *words, "-o", "no.yaml").startswith(told)
     assert not Path("no.yaml").exists()
+
+
+def test_a_name_of_digits_alone_is_a_name(capsys):
+    text = Path("named.yaml").read_text(encoding="utf-8").replace("{bench:", "{2024:")
+    Path("numbered.yaml").write_text(text, encoding="utf-8")
+    shutil.copy("bench.mcap", "2024.mcap")
+    assert main(["info", "2024.mcap", "--robot", "numbered.yaml"]) == 0
+    assert "Locked springs in 2024.mcap (joint1, joint2, joint3, joint4)" in capsys.readouterr().out
 
 
 def test_without_the_file_s_word_what_springs_do_not_do_tells(capsys):

@@ -40,11 +40,17 @@ def test_what_does_not_go_together_is_refused_in_one_line(options, text, tmp_pat
     assert text in said and len(said.strip().splitlines()) == 1
 
 
-def test_a_kind_that_the_robot_file_does_not_describe_is_told_before_anything_is_read(tmp_path, capsys):
-    given = ["--rests", str(SPRING3), "--poses", "poses.csv", "-o", str(tmp_path / "o.yaml")]
-    assert main(["discover", "biorob", *given]) == 1
-    said = capsys.readouterr().err
-    assert "biorob.yaml has no section `poses`" in said and said.count("\n") == 1
+@pytest.mark.parametrize(
+    ("given", "told"),
+    [
+        ([SPRING1, "--rests", SPRING3], "the motors stand often: rests follow --rests"),
+        (["--rests", SPRING3, "--poses", "poses.csv"], "biorob.yaml has no section `poses`"),
+    ],
+)
+def test_several_kinds_of_which_one_cannot_be_are_refused_before_anything_is_searched(given, told, tmp_path, capsys):
+    assert main(["discover", "biorob", *map(str, given), "-o", str(tmp_path / "o.yaml")]) == 1
+    assert told in capsys.readouterr().err
+    assert not (tmp_path / "o.yaml").exists()
 
 
 def test_limits_go_with_calibrate_and_compare(tmp_path, capsys):

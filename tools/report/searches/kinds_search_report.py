@@ -38,10 +38,8 @@ def kinds_search_report(found: KindsDiscovery, more: Sequence[Section] = ()) -> 
     if last.rests is not None:
         sections += rest_sections(last.rests.steps[-1].result)[1:]
     given = found.given
-    paths = [*(r.path for r in given.motion), *(p.path for p in given.poses), *(r.path for r in given.rests)]
-    paths += [each[0].path for each in given.shaken]
     title = f"{found.robot.name}: what is missing, from {' and '.join(given.kinds)}"
-    return page(title, ", ".join(paths), [*sections, *more])
+    return page(title, ", ".join(given.paths), [*sections, *more])
 
 
 def _steps(found: KindsDiscovery) -> Section:

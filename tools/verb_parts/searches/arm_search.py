@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict
 from functools import partial
 from pathlib import Path
@@ -157,8 +157,8 @@ def _discovery(found: Any, robot_file: Path | None) -> dict[str, Any]:
         if step.calibrated.frequency is not None:
             train["frequency"] = step.left / found.steps[-1].left
             if step.shaken:
-                by_kind["frequency"] = step.left_heldout / found.steps[-1].left_heldout
-        errors = {"train_error": _rms(train), "heldout_error": _rms(by_kind) if by_kind else None, "floor": 1.0}
+                by_kind["frequency"] = step.left_heldout / found.steps[-1].left
+        errors = {"train_error": rms(train), "heldout_error": rms(by_kind) if by_kind else None, "floor": 1.0}
         added = {"added": step.added.hypothesis.label if step.added else None, "removed": None}
         mm = {"poses": None if step.heldout is None else step.heldout.to_json()}
         torques = {} if step.calibrated.frequency is None else {"torques_left": step.left}
@@ -174,7 +174,8 @@ def _discovery(found: Any, robot_file: Path | None) -> dict[str, Any]:
     }
 
 
-def _rms(by_kind: dict[str, float]) -> float:
+def rms(by_kind: Mapping[str, float]) -> float:
+    """Root mean square over kinds."""
     return float(sum(e**2 for e in by_kind.values()) / len(by_kind)) ** 0.5
 
 

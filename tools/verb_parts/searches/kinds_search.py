@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 import argparse
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -24,7 +24,7 @@ from jointscope.tools.writing.whole_file import write_json
 if TYPE_CHECKING:
     from jointscope.graphs.across_kinds.kinds_recordings import KindsRecordings
 
-FREQUENCY = "frequency"
+FREQUENCY, RESTS = "frequency", "rests"
 
 
 def several_graphs(args: argparse.Namespace) -> bool:
@@ -50,22 +50,43 @@ def run_kinds_diagnosis(
     """
     from jointscope.graphs.across_kinds.diagnose_kinds import ask_kinds
     from jointscope.graphs.joint_kinds.discover_arm import scored
-    from jointscope.tools.report.searches.kinds_section import kinds_section
     from jointscope.tools.terminal.searches.kinds_text import kinds_text
 
-    if not args.bags and (files.pictures or files.rrd is not None):
-        raise RobotError(
-            f"{robot.name}: without motion, `diagnose` of several kinds has text and --json; leave the option out"
-        )
+    _must_have_motion(bool(args.bags), robot, files)
     given, held = _read(robot, args, workers, progress)
     found = ask_kinds(robot, given, held, progress, {"missing_torque": files.pictures, "side_by_side": workers})
     arm = None if found.arm_base is None else scored(found.arm_base, found.arm, held.poses, held.shaken)
+    write_kinds_diagnosis(found, arm, files)
+    return kinds_text(found, arm)
+
+
+def _must_have_motion(moving: bool, robot: Robot, files: ResultFiles) -> None:
+    if not moving and (files.pictures or files.rrd is not None):
+        raise RobotError(
+            f"{robot.name}: without motion, `diagnose` of several kinds has text and --json; leave the option out"
+        )
+
+
+def write_kinds_diagnosis(found: Any, arm: Any, files: ResultFiles) -> None:
+    """Writes the report of the motion with the ranking over all kinds first, and JSON.
+
+    Args:
+        found: the diagnosis.
+        arm: its poses and frequency responses with their errors on those held out; None without.
+        files: where to.
+
+    Raises:
+        RobotError: pictures were asked for, and there is no motion.
+        JointscopeError: a file cannot be written; then none is.
+    """
+    from jointscope.tools.report.searches.kinds_section import kinds_section
+
+    _must_have_motion(found.motion is not None, found.robot, files)
     content = kinds_json(found, arm)
     if found.motion is not None:
         write_diagnosis(found.motion, files, first=[kinds_section(found)], content=content)
     elif files.json is not None:
         write_json(files.json, content)
-    return kinds_text(found, arm)
 
 
 def run_kinds_discovery(
@@ -78,19 +99,36 @@ def run_kinds_discovery(
         JointscopeError: the recordings cannot be used, or a file cannot be written; then none is.
     """
     from jointscope.graphs.across_kinds.discover_kinds import discover_kinds
-    from jointscope.tools.report.searches.kinds_search_report import kinds_search_report
     from jointscope.tools.terminal.searches.kinds_discovery_text import kinds_discovery_text
 
-    if files.rrd is not None:
-        raise RobotError(f"{robot.name}: --rrd shows motion alone; leave it out where several kinds are searched")
+    _refuse_viewer(robot, files)
     if args.restart:
         raise RecordingError("--restart: a search over several kinds keeps no steps on disk; leave it out")
     given, held = _read(robot, args, workers, progress)
     found = discover_kinds(robot, given, held, progress, missing_torque=False, side_by_side=workers)
-    made = origin(robot.path.name, given.motion) if given.motion else made_from(robot.path.name)
+    write_kinds_discovery(found, files)
+    return kinds_discovery_text(found)
+
+
+def _refuse_viewer(robot: Robot, files: ResultFiles) -> None:
+    if files.rrd is not None:
+        raise RobotError(f"{robot.name}: --rrd shows motion alone; leave it out where several kinds are searched")
+
+
+def write_kinds_discovery(found: Any, files: ResultFiles) -> None:
+    """Writes the robot file of the last step, report and JSON.
+
+    Raises:
+        RobotError: a viewer recording was asked for.
+        JointscopeError: a file cannot be written; then none is.
+    """
+    from jointscope.tools.report.searches.kinds_search_report import kinds_search_report
+
+    _refuse_viewer(found.robot, files)
+    began, given = found.steps[0].model.robot.path.name, found.given
+    made = origin(began, given.motion) if given.motion else made_from(began)
     made |= _still_origin(given)
     write_still(files, found.robot, made, partial(kinds_search_report, found), discovery_json(found, files.robot))
-    return kinds_discovery_text(found)
 
 
 def _read(
@@ -100,7 +138,7 @@ def _read(
     from jointscope.graphs.across_kinds.kinds_recordings import KindsRecordings
     from jointscope.tools.bags.at_poses.read_poses import read_poses
 
-    _must_have_sections(robot, args)
+    must_have_sections(robot, bool(args.bags or args.rests), bool(args.poses), bool(args.frequency))
     motion, holdout = read_bags(args, robot, progress) if args.bags else ([], None)
     check_workers(workers, robot, motion)
 
@@ -116,8 +154,14 @@ def _read(
     return given, KindsRecordings(() if holdout is None else (holdout,), **others)
 
 
-def _must_have_sections(robot: Robot, args: argparse.Namespace) -> None:
+def must_have_sections(robot: Robot, moving: bool, posed: bool, shaken: bool) -> None:
     """What the robot file must say of the kinds that are given, before hours are read.
+
+    Args:
+        robot: the model.
+        moving: whether there are motion or rests.
+        posed: whether there are poses.
+        shaken: whether there are frequency responses.
 
     Raises:
         RobotError: a section is missing, or the links have no equations.
@@ -125,11 +169,11 @@ def _must_have_sections(robot: Robot, args: argparse.Namespace) -> None:
     from jointscope.robots.files.sections.frequency_section import no_frequency
     from jointscope.robots.files.sections.pose_section import no_poses
 
-    if args.bags or args.rests:
+    if moving:
         robot.need_link_dynamics()
-    if args.frequency and robot.frequency is None:
+    if shaken and robot.frequency is None:
         raise RobotError(no_frequency(robot))
-    if args.poses and robot.poses is None:
+    if posed and robot.poses is None:
         raise RobotError(no_poses(robot))
 
 
@@ -166,19 +210,25 @@ def kinds_json(found: Any, arm: Any = None) -> dict[str, Any]:
 
 
 def discovery_json(found: Any, robot_file: Path | None) -> dict[str, Any]:
-    """All steps for machines: errors of each in sigmas of the last model's noise, torques left as parts of its own."""
-    train, heldout = ([each[i] for each in found.errors] for i in (0, 1))
+    """All steps for machines: errors of each in sigmas of the last model's noise.
+
+    Torques that responses leave have no sigma: what the last model leaves of those for training counts as one. Of rests
+    of motors alone the error is a part of the friction, and its floor is zero.
+    """
+    left = found.errors[-1][0].get(FREQUENCY, 1.0)
+    of_band = bool(found.given.rests) and found.given.rests[0].q_link is None
     steps = []
-    for k, step in enumerate(found.steps):
-        own, held = (_over_last(each, k) for each in (train, heldout))
+    for step, errors in zip(found.steps, found.errors, strict=True):
+        own, held = ({k: e / left if k == FREQUENCY else e for k, e in each.items()} for each in errors)
+        floor = {kind: 0.0 if of_band and kind == RESTS else 1.0 for kind in own}
         c = step.added
         steps.append(
             {
                 "added": None if c is None else c.label,
                 "removed": step.removed or None,
-                "train_error": _rms(own),
-                "heldout_error": _rms(held) if held else None,
-                "floor": 1.0,
+                "train_error": arm_search.rms(own),
+                "heldout_error": arm_search.rms(held) if held else None,
+                "floor": arm_search.rms(floor),
                 "by_kind": {**own, **held},
                 "train_by_kind": own,
                 "heldout_by_kind": held,
@@ -192,16 +242,6 @@ def discovery_json(found: Any, robot_file: Path | None) -> dict[str, Any]:
         "adequate": found.adequate,
         "robot_file": None if robot_file is None else str(robot_file),
     }
-
-
-def _over_last(errors: Sequence[Mapping[str, float]], k: int) -> dict[str, float]:
-    """Of a step by kind; torques that responses leave have no sigma of their own, and that of the last model counts."""
-    last = errors[-1].get(FREQUENCY, 1.0)
-    return {kind: error / last if kind == FREQUENCY else error for kind, error in errors[k].items()}
-
-
-def _rms(by_kind: Mapping[str, float]) -> float:
-    return float(sum(error**2 for error in by_kind.values()) / len(by_kind)) ** 0.5
 
 
 def _effect(c: Any) -> dict[str, Any]:
