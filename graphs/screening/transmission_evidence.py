@@ -57,6 +57,7 @@ class Bar(NamedTuple):
     alike: float
 
 
+STANDS = 1e-9  # of the largest reading, from which a column moves
 LINKS, DRIVES = Bar(0.5, 1.4, 1.2, 1.15), Bar(0.35, 1.7, 1.3, 1.3)  # drives see a soft spring's link hardly at all
 
 
@@ -154,7 +155,7 @@ def seen_by_link_encoder(moved: Moved) -> Told | None:
     if encoder is None:
         return None
     measured = moved.measured(encoder.name)
-    size = np.std(measured, axis=0) + 1e-300
+    size = _sizes(measured)
 
     def equations(T: Array) -> Equations:
         stretched = T[None] * moved.load(T)[:, None, :]
@@ -200,7 +201,7 @@ def seen_by_drives(moved: Moved) -> Told:
     """Commands, each beside its own size; where they are torques, with the factor one."""
     robot = moved.robot
     measured = moved.measured("command")
-    size = np.std(measured, axis=0) + 1e-300
+    size = _sizes(measured)
     dry = np.tanh(moved.now.v / REVERSAL)
     known = robot.command.unit in ("N m", "N")
 
@@ -215,3 +216,9 @@ def seen_by_drives(moved: Moved) -> Told:
         return found
 
     return Told("the command", stated_matrix(robot), equations, bar=DRIVES)
+
+
+def _sizes(measured: Array) -> Array:
+    """Standard deviation of each column, shape (k,); infinite of one that stands still, which then says nothing."""
+    size = np.std(measured, axis=0)
+    return np.asarray(np.where(size > STANDS * np.max(np.abs(measured), axis=0, initial=0.0), size, np.inf))

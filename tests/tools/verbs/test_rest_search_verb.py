@@ -40,6 +40,7 @@ def test_what_does_not_go_together_is_refused_in_one_line(options, text, tmp_pat
     assert text in said and len(said.strip().splitlines()) == 1
 
 
+@pytest.mark.filterwarnings("error")  # a drive that stands exactly is no reason for a warning
 @pytest.mark.parametrize(
     ("given", "told"),
     [
