@@ -156,10 +156,13 @@ def _tie(robot: Robot, found: NewestState, zones: list[tuple[int, float, float]]
         plays: of its encoders; None for none.
     """
     layout, P, mean = robot.layout, found.covariance, found.mean
-    for (sensor, _), lag, q in zip(plays.seats, plays.lags, plays.positions, strict=True) if plays is not None else ():
-        if sensor == robot.motor_encoder.name:
-            P[q, q] += P[lag, lag]
-            P[q, lag] = P[lag, q] = P[lag, lag]
+    if plays is not None:
+        half = np.maximum(plays.sizes(robot.values), plays.corners)
+        P[plays.lags, plays.lags] = half**2  # wider, and the side on which a lag is taken to be would be one beyond it
+        for (sensor, _), lag, q in zip(plays.seats, plays.lags, plays.positions, strict=True):
+            if sensor == robot.motor_encoder.name:
+                P[q, q] += P[lag, lag]
+                P[q, lag] = P[lag, q] = P[lag, lag]
     middle, doubt = np.zeros(robot.n), np.full(robot.n, DEFLECTION_SIGMA)
     for j, ahead, unsure in zones:
         middle[j], doubt[j] = ahead, unsure
