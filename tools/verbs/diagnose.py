@@ -77,6 +77,7 @@ def run(args: argparse.Namespace) -> int:
         given, held = (args.poses, args.frequency), (args.holdout_poses, args.holdout_frequency)
         with progress_bar() as progress:
             print(run_arm_search(robot, given, held, files, False, progress))
+        files.tell()
         return 0
     if args.rests:
         if limits:
