@@ -12,8 +12,7 @@ from jointscope.robots.model.robot import Robot
 from jointscope.robots.recordings.recording import Recording
 from jointscope.tools.presentation.left_out import add_leave_out_option, leave_out
 from jointscope.tools.terminal.progress import Progress, reading
-from jointscope.tools.verb_parts.pose_runs import check_one_kind
-from jointscope.tools.verb_parts.rest_runs import check_held_out_rests
+from jointscope.tools.verb_parts.pose_runs import check_one_kind, given_once
 from jointscope.tools.verb_parts.user_effects import add_effects_option
 
 KINDS = {
@@ -95,15 +94,20 @@ def check_kind(args: argparse.Namespace) -> None:
         "--scheduler": args.scheduler is not None,
         "--workers": args.workers > 1,
     }
-    check_held_out_rests(args)
+    for kind in KINDS:
+        _check_held_out(kind, getattr(args, kind), getattr(args, f"holdout_{kind}"))
     check_one_kind(args.bags, args.poses, args.rests, of_motion, args.frequency)
-    if args.holdout_poses and not args.poses:
-        raise RecordingError("--holdout-poses goes with --poses")
-    if args.holdout_frequency and not args.frequency:
-        raise RecordingError("--holdout-frequency goes with --frequency")
-    twice = next((path for path in args.holdout_frequency if path in args.frequency), None)
+
+
+def _check_held_out(kind: str, given: Sequence[Path], held: Sequence[Path]) -> None:
+    """What is held out goes with others of its kind, and is none of them, under whatever name."""
+    if held and not given:
+        raise RecordingError(f"--holdout-{kind} goes with --{kind}")
+    twice = next((path for path in held if path in given), None)
     if twice is not None:
-        raise RecordingError(f"{twice} is given with --frequency and held out; leave it out once")
+        raise RecordingError(f"{twice} is given with --{kind} and held out; leave it out once")
+    if held:
+        given_once(f"--holdout-{kind}", [*given, *held])
 
 
 def read_bags(args: argparse.Namespace, robot: Robot, progress: Progress) -> tuple[list[Recording], Recording | None]:

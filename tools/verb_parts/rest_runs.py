@@ -3,14 +3,12 @@
 
 from __future__ import annotations
 
-import argparse
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from jointscope.robots.errors import RecordingError
 from jointscope.robots.model.robot import Robot
 from jointscope.robots.rests.rests import Rests
 from jointscope.tools.acceptance.evaluation import AcceptedBy
@@ -23,19 +21,6 @@ from jointscope.tools.writing.origin import made_from, other_kinds
 
 if TYPE_CHECKING:
     from jointscope.graphs.locked_springs.coupling import Coupling
-
-
-def check_held_out_rests(args: argparse.Namespace) -> None:
-    """Held-out rests go with others.
-
-    Raises:
-        RecordingError: a recording twice, or none that the held-out ones go with.
-    """
-    if args.holdout_rests and not args.rests:
-        raise RecordingError("--holdout-rests goes with --rests")
-    twice = next((path for path in args.holdout_rests if path in args.rests), None)
-    if twice is not None:
-        raise RecordingError(f"{twice} is given with --rests and held out; leave it out once")
 
 
 def read_all_rests(paths: Sequence[Path], robot: Robot, progress: Progress) -> list[Rests]:
