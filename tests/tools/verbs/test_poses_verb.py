@@ -220,7 +220,7 @@ def test_simulate_discover_and_diagnose_on_poses(tmp_path, monkeypatch, capsys):
 def test_a_copy_of_a_recording_is_not_held_out(tmp_path, monkeypatch, capsys, kind):
     monkeypatch.chdir(tmp_path)
     for name in ("a.mcap", "copy.mcap"):
-        Path(name).write_bytes(b"the same")
+        (tmp_path / name).write_bytes(b"the same")
     assert main(["diagnose", "tx90l", f"--{kind}", "a.mcap", f"--holdout-{kind}", "copy.mcap"]) == 1
     told = f"--holdout-{kind}: copy.mcap is the same recording as a.mcap; give every recording once"
     assert told in capsys.readouterr().err
