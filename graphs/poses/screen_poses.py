@@ -93,6 +93,12 @@ def _check_targets(problem: PoseSet, target: Array) -> None:
         )
     _check_single_poses(problem, predicted, target)
     _check_joints(problem, target, left)
+    if left < LARGEST_ERROR and problem.own_tracker:
+        raise RecordingError(
+            f"{poses.path}: the targets contradict each other: {problem.targets.first} alone fits to "
+            f"{1e3 * left:.2g} mm, with the others it misses by {1e3 * misses:.3g} mm; check `link` and `at` of the "
+            f"others in {place}, and their names in the table"
+        )
     if left < LARGEST_ERROR:
         raise RecordingError(
             f"{poses.path}: the tracker does not stand where {place} says: another place fits to {1e3 * left:.2g} mm "

@@ -7,6 +7,7 @@ each of the usual other conventions is tried.
 
 from __future__ import annotations
 
+from dataclasses import replace
 from itertools import combinations, product
 
 import numpy as np
@@ -14,7 +15,7 @@ from numpy.typing import NDArray
 
 from jointscope.graphs.poses.pose_set import PoseSet
 from jointscope.graphs.poses.seen_targets import Mount, mounts
-from jointscope.graphs.poses.tracker_start import is_open, tool_seen
+from jointscope.graphs.poses.tracker_start import is_open, predicted_places, tool_seen, tracker_by
 from jointscope.robots.errors import RecordingError
 from jointscope.robots.geometry.error_parameters import TOOL
 from jointscope.robots.geometry.rotations import (
@@ -59,6 +60,7 @@ def screen_targets(problem: PoseSet) -> None:
         _check_names(problem, one, other)
     for one, other in combinations(problem.targets.sightings, 2):
         _check_some_names(problem, one, other)
+    _check_contradictions(problem, known)
 
 
 def check_lost(poses: Poses, places: Array, target: str, what: str) -> None:
@@ -102,20 +104,16 @@ def _is_known(problem: PoseSet, mount: Mount) -> bool:
     return mount.owner == TOOL or not is_open(problem.robot, mount.owner)
 
 
-def _predicted(problem: PoseSet, name: str) -> Array:
-    """Places of a target in the axes of the tracker, shape (m, 3)."""
-    (point, values), found = tool_seen(problem), mounts(problem.robot)
-    first, link = next(iter(found.values())), found[name].on(point)
-    return np.asarray(link.target + link.turn @ found[name].away(first, values))
-
-
 def _check_units(problem: PoseSet) -> None:
     """Some targets may be in millimetres; where all are, that is told of the first."""
+    assert problem.robot.poses is not None
     (tool, _), found, wrong = tool_seen(problem), mounts(problem.robot), []
+    unknown = {target.name for target in problem.robot.poses.targets if target.at is None}
     for s in problem.targets.sightings:
         there = np.isfinite(s.place[:, 0])
-        link = found[s.name].on(tool).target
-        apart = [float(np.linalg.norm(np.std(x[there], axis=0))) for x in (s.place, link)]
+        # a place on the tool that was found from these very positions says nothing of their unit
+        expected = found[s.name].on(tool).target if s.name in unknown else predicted_places(problem, s.name)
+        apart = [float(np.linalg.norm(np.std(x[there], axis=0))) for x in (s.place, expected)]
         if there.sum() >= FEWEST and MILLI[0] < apart[0] / max(apart[1], 1e-12) < MILLI[1]:
             wrong.append(s.name)
     if wrong and len(wrong) < len(problem.targets.sightings):
@@ -134,7 +132,10 @@ def _some(problem: PoseSet, far: NDArray[np.bool_]) -> str:
 def _check_some_names(problem: PoseSet, one: Sighting, other: Sighting) -> None:
     """Two targets may have each other's name in some poses: the way from one to the other is turned round there."""
     there = np.isfinite(one.place[:, 0]) & np.isfinite(other.place[:, 0])
-    predicted, seen = _predicted(problem, one.name) - _predicted(problem, other.name), one.place - other.place
+    predicted, seen = (
+        predicted_places(problem, one.name) - predicted_places(problem, other.name),
+        one.place - other.place,
+    )
     with np.errstate(invalid="ignore"):
         right, turned = (np.linalg.norm(seen - sign * predicted, axis=1) for sign in (1.0, -1.0))
         wrong = there & (right > FAR) & (turned < MUCH_BETTER * right)
@@ -150,7 +151,7 @@ def _check_names(problem: PoseSet, one: Sighting, other: Sighting) -> None:
     there = np.isfinite(one.place[:, 0]) & np.isfinite(other.place[:, 0])
     if there.sum() < FEWEST:
         return
-    predicted = np.concatenate([_predicted(problem, s.name)[there] for s in (one, other)])
+    predicted = np.concatenate([predicted_places(problem, s.name)[there] for s in (one, other)])
     places = [one.place[there], other.place[there]]
     left, exchanged = (base_from_tracker(predicted, np.concatenate(each))[1] for each in (places, places[::-1]))
     if left > FAR and exchanged < MUCH_BETTER * left:
@@ -161,10 +162,21 @@ def _check_names(problem: PoseSet, one: Sighting, other: Sighting) -> None:
         )
 
 
+def _check_contradictions(problem: PoseSet, known: list[Sighting]) -> None:
+    """Where poses themselves place the tracker, a target that is elsewhere drags it along: without it, others fit."""
+    if not problem.own_tracker or len(known) < 2:
+        return
+    _, left = tracker_by(problem, known)
+    for odd in reversed(known[1:]):
+        tracker, without = tracker_by(problem, [s for s in known if s is not odd])
+        if left > LARGEST_ERROR and without < min(MUCH_BETTER * left, LARGEST_ERROR / 5.0):
+            _check_place(replace(problem, tracker=tracker), odd, mounts(problem.robot)[odd.name])
+
+
 def _check_place(problem: PoseSet, sighting: Sighting, mount: Mount) -> None:
     point = mount.on(tool_seen(problem)[0])
     there = np.isfinite(sighting.place[:, 0])
-    away = (sighting.place - _predicted(problem, sighting.name))[there]
+    away = (sighting.place - predicted_places(problem, sighting.name))[there]
     misses = float(np.sqrt(np.mean(np.sum(away**2, axis=1))))
     if there.sum() < FEWEST or misses < LARGEST_ERROR:
         return

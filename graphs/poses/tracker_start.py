@@ -158,5 +158,21 @@ def tool_seen(problem: PoseSet) -> tuple[SaggingPoint, dict[str, float]]:
     return in_tracker(point, problem.tracker, values, problem.poses.shares), values
 
 
+def predicted_places(problem: PoseSet, name: str) -> Array:
+    """Places of a target in the axes of the tracker at the robot's values, shape (m, 3)."""
+    (point, values), found = tool_seen(problem), mounts(problem.robot)
+    first, link = next(iter(found.values())), found[name].on(point)
+    return np.asarray(link.target + link.turn @ found[name].away(first, values))
+
+
+def tracker_by(problem: PoseSet, some: Sequence[Sighting]) -> tuple[Array, float]:
+    """Base from tracker, shape (4, 4), by some targets alone, and how well it fits [m]."""
+    seen = [np.isfinite(s.place[:, 0]) for s in some]
+    predicted = [predicted_places(problem, s.name)[there] for s, there in zip(some, seen, strict=True)]
+    measured = np.concatenate([s.place[there] for s, there in zip(some, seen, strict=True)])
+    T, left, _ = base_from_tracker(np.concatenate(predicted), measured)
+    return np.asarray(problem.tracker @ T), left
+
+
 def _sightings(problems: Sequence[PoseSet], name: str) -> list[tuple[PoseSet, Sighting]]:
     return [(problem, s) for problem in problems for s in problem.targets.sightings if s.name == name]

@@ -52,14 +52,14 @@ def check_one_kind(
     if twice is not None:
         raise RecordingError(f"{twice[0]} is given as motion and as {twice[1]}; leave it out once")
     for option, paths in (("--poses", poses), ("--rests", rests or ()), ("--frequency", frequency or ())):
-        _given_once(option, paths)
+        given_once(option, paths)
     given = next((option for option, there in options.items() if there), None)
     if given and not bags:
         other = "--poses" if poses else "--frequency" if frequency else "--rests" if rests else "--locked-springs"
         raise RecordingError(f"{given} is for recordings of motion; leave it out with {other}")
 
 
-def _given_once(option: str, paths: Sequence[Path]) -> None:
+def given_once(option: str, paths: Sequence[Path]) -> None:
     """As `must_count_once`, for recordings that are not read yet; what is not there, its reader says."""
     from jointscope.tools.bags.messages.open_bag import bag_sha256
 

@@ -202,3 +202,45 @@ def test_links_that_cannot_carry_a_target_are_told(tmp_path, targets, told):
     with pytest.raises(RobotError) as err:
         tool_with(tmp_path, targets)
     assert told in str(err.value) and "\n" not in str(err.value)
+
+
+def free_tracker(folder, targets):
+    """The arm with those targets, the place of whose tracker nothing says."""
+    path = tool_with(folder, targets).path
+    text = path.read_text(encoding="utf-8").replace("  tracker: ", "  # tracker: ", 1)
+    path.write_text(text, encoding="utf-8")
+    robot = load_robot(path)
+    assert robot.poses.tracker is None
+    return robot
+
+
+@pytest.mark.parametrize(
+    ("targets", "told"),
+    [
+        (
+            "elbow: {link: link3, at: [100, 50, 20]}",
+            r"target elbow is not where \S+ has it on link3, .*; at \[0\.\d+, 0\.\d+, 0\.\d+\] of link3 it fits to",
+        ),
+        ("elbow: {link: link4, at: [0.1, 0.05, 0.02]}", r"target elbow is not where \S+ has it on link4"),
+    ],
+)
+def test_a_target_elsewhere_is_told_though_the_tracker_is_placed_by_it_too(robot, tmp_path, targets, told):
+    poses = simulate_poses(tool_with(tmp_path, "elbow: {link: link3, at: [0.1, 0.05, 0.02]}"), 20, 3)[0]
+    with pytest.raises(RecordingError, match=told):
+        calibrate_poses(free_tracker(tmp_path, targets), [poses])
+
+
+@pytest.mark.parametrize(
+    ("names", "told"),
+    [
+        (("elbow",), "places of elbow are about 1000 times as far apart as those of the other targets, as in milli"),
+        (("reflector", "elbow"), "targets are 1000 times as far apart as the arm puts them, as in millimetres; expec"),
+    ],
+)
+def test_millimetres_of_some_targets_and_of_all_are_told_apart(tmp_path, names, told):
+    robot = free_tracker(tmp_path, "elbow: {link: link3, at: [0.1, 0.05, 0.02]}")
+    poses = simulate_poses(robot, 20, 3)[0]
+    others = tuple(replace(s, place=s.place * (1e3 if s.name in names else 1.0)) for s in poses.others)
+    target = poses.target * (1e3 if "reflector" in names else 1.0)
+    with pytest.raises(RecordingError, match=told):
+        calibrate_poses(robot, [replace(poses, target=target, others=others)])

@@ -2,7 +2,7 @@
 """Every regressor against the numerical derivative of the residuals of the model that really has the effect.
 
 This catches wrong signs, owners, equations and units. Bearings and springs of rigid joints bring coordinates along that
-a derivative at null does not have; they have a test of their own beside this one.
+a derivative at null does not have, and the play of an encoder has none there; they have tests of their own.
 """
 
 from __future__ import annotations
@@ -21,7 +21,8 @@ TRAPEZOID = 0.03  # relative difference between the two rules along this motion
 SLIGHT = 0.1  # of the largest change: equations that change less are held against that
 
 QUASI_STATIC = ("bearing_flexibility", "joint_elasticity")
-CASES = [case for case in one_hypothesis_each("doggy") if case[1].here.effect.id not in QUASI_STATIC]
+FOLLOWED = ("encoder_hysteresis",)
+CASES = [case for case in one_hypothesis_each("doggy") if case[1].here.effect.id not in QUASI_STATIC + FOLLOWED]
 CASES += one_hypothesis_each("without Coriolis terms", ("coriolis",))
 OTHERS = ("motor_viscous", "torque_offset", "motor_lag", "link_viscous", "gravity_imbalance", "kinematic_coupling")
 OTHERS += ("inertia_error", "gyro_scale", "gyro_delay", "encoder_delay", "encoder_eccentricity")
@@ -37,7 +38,7 @@ CASES += one_hypothesis_each("known drives", ("torque_constant_error",))
 
 
 def test_every_effect_has_a_case():
-    tested = {hypothesis.here.effect.id for _, hypothesis in CASES} | set(QUASI_STATIC)
+    tested = {hypothesis.here.effect.id for _, hypothesis in CASES} | set(QUASI_STATIC + FOLLOWED)
     assert set(catalogue()) - tested == {
         "integration_error",
         "load_scale",
@@ -72,6 +73,25 @@ def test_a_regressor_is_the_derivative_of_the_residuals(name, hypothesis):
             off = np.linalg.norm(derivative - column)
             assert off <= allowed, f"{size.name} in {row}: off by {off / max(np.linalg.norm(derivative), 1e-300):.3g}"
     assert any(seen), "no size changes any residual"
+
+
+@pytest.mark.parametrize("joint", ["joint1", "joint2", "joint3"])
+def test_the_regressor_of_a_play_is_what_its_encoder_misses_of_it(joint):
+    """Turned by hand: the reading stands until the play is gone through, and then trails by half of it."""
+    segment, x = base("doggy")
+    hypothesis = next(h for _, h in one_hypothesis_each("doggy", FOLLOWED) if h.here.owner == joint)
+    robot, columns = segment.problem.robot, regressors(segment, hypothesis)
+    j = robot.joints.index(joint)
+    half = 2.0 * robot.motor_encoder.sigmas[j]
+    q, misses, read = x[:, robot.layout.motor_q[j]], [], x[0, robot.layout.motor_q[j]]
+    for turned in q:
+        read = min(max(read, turned - half), turned + half)
+        misses.append((read - turned) / half)
+    (row,) = [row for row in columns if row.startswith("motor_encoder") and joint in row]
+    seen = columns[row][:, 0]
+    at = np.linspace(0, len(misses) - 1, len(seen)).round().astype(int)
+    assert np.corrcoef(seen, np.asarray(misses)[at])[0, 1] > 0.99
+    assert all(not np.any(other[:, 0]) for name, other in columns.items() if name != row)
 
 
 def test_the_regressor_of_the_integration_error_is_what_the_better_rule_changes():

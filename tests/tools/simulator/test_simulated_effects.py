@@ -53,6 +53,7 @@ CATALOGUE = {  # id: (owners, parameters) as simulator and estimator have agreed
     ),
     "encoder_scale": ("joint", "scale"),
     "encoder_eccentricity": ("joint, joint seen on the link", "cos sin order"),
+    "encoder_hysteresis": ("joint, joint seen on the link", "half_play"),
     "encoder_harmonics": ("joint, joint seen on the link", "cos sin order"),
     "axis_misalignment": ("joint", "x y"),
     "encoder_delay": ("joint, robot, target, link encoders", "delay"),

@@ -216,6 +216,16 @@ def test_simulate_discover_and_diagnose_on_poses(tmp_path, monkeypatch, capsys):
     assert (first["effect"], first["owner"], first["verdict"]) == ("joint_elasticity", "joint5", "missing")
 
 
+@pytest.mark.parametrize("kind", ["poses", "frequency", "rests"])
+def test_a_copy_of_a_recording_is_not_held_out(tmp_path, monkeypatch, capsys, kind):
+    monkeypatch.chdir(tmp_path)
+    for name in ("a.mcap", "copy.mcap"):
+        (tmp_path / name).write_bytes(b"the same")
+    assert main(["diagnose", "tx90l", f"--{kind}", "a.mcap", f"--holdout-{kind}", "copy.mcap"]) == 1
+    told = f"--holdout-{kind}: copy.mcap is the same recording as a.mcap; give every recording once"
+    assert told in capsys.readouterr().err
+
+
 @pytest.mark.parametrize(
     ("arguments", "told"),
     [
@@ -224,6 +234,10 @@ def test_simulate_discover_and_diagnose_on_poses(tmp_path, monkeypatch, capsys):
         (
             ["diagnose", "tx90l", "--frequency", "b.mcap", "--holdout-frequency", "b.mcap"],
             "b.mcap is given with --frequency and held out",
+        ),
+        (
+            ["discover", "tx90l", "--poses", "p.csv", "--holdout-poses", "p.csv", "-o", "a.yaml"],
+            "p.csv is given with --poses and held out; leave it out once",
         ),
         (["discover", "doggy", "a.mcap", "--frequency", "b.mcap", "-o", "a.yaml"], "doggy.yaml has no section `freq"),
         (
