@@ -98,6 +98,7 @@ def test_stamps_and_forces_are_understood(bench):
     [
         (("time,link", "0,attachment"), "no column 'fx'; expected time, link, and mass [kg] or fx, fy, fz [N]"),
         (("t,link,mass", "0,attachment,1"), "no column 'time'; "),
+        (("time,link,mass,fz", "0,attachment,1,-9.81"), "columns mass and fz both say what hangs there; expected mass"),
         (
             ("time,link,mass", "0,atachment,1"),
             "no link 'atachment' in biorob.urdf; did you mean 'attachment'?; column link names the",

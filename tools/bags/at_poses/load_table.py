@@ -71,6 +71,12 @@ def loads_from_table(path: Path, robot: Robot, recording: Recording) -> LoadHist
 
 def _forces(table: Table, robot: Robot) -> Array:
     """Force of each row in the axes of the base, shape (k, 3) [N]."""
+    both = [axis for axis in FORCE if axis in table.head] if "mass" in table.head else []
+    if both:
+        raise RecordingError(
+            f"{table.path}: columns mass and {', '.join(both)} both say what hangs there; expected mass [kg] or fx, "
+            "fy, fz [N]: leave out one of the two"
+        )
     if "mass" in table.head:
         mass = table.numbers([table.head.index("mass")])
         if np.any(mass < 0.0):
