@@ -12,7 +12,7 @@ from jointscope.robots.model.robot import Robot
 from jointscope.robots.recordings.recording import Recording
 from jointscope.tools.presentation.left_out import add_leave_out_option, leave_out
 from jointscope.tools.terminal.progress import Progress, reading
-from jointscope.tools.verb_parts.pose_runs import check_one_kind
+from jointscope.tools.verb_parts.pose_runs import check_one_kind, given_once
 from jointscope.tools.verb_parts.user_effects import add_effects_option
 
 KINDS = {
@@ -105,14 +105,13 @@ def _check_held_out(option: str, given: Sequence[Path], held: Sequence[Path]) ->
     Raises:
         RecordingError: there are no others, or one is the same.
     """
-    from jointscope.tools.bags.messages.open_bag import bag_sha256
-
     if held and not given:
         raise RecordingError(f"--holdout-{option[2:]} goes with {option}")
-    contents = {bag_sha256(path) for path in given if path.exists()} if held else set[str]()
-    for path in held:
-        if path in given or (path.exists() and bag_sha256(path) in contents):
-            raise RecordingError(f"{path} is given with {option} and held out; leave it out once")
+    twice = next((path for path in held if path in given), None)
+    if twice is not None:
+        raise RecordingError(f"{twice} is given with {option} and held out; leave it out once")
+    if held:
+        given_once(f"--holdout-{option[2:]}", [*given, *held])
 
 
 def read_bags(args: argparse.Namespace, robot: Robot, progress: Progress) -> tuple[list[Recording], Recording | None]:
