@@ -7,6 +7,7 @@ each of the usual other conventions is tried.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import replace
 from itertools import combinations, product
 
@@ -53,13 +54,13 @@ def screen_targets(problem: PoseSet) -> None:
         return
     for sighting in problem.targets.sightings:
         check_lost(problem.poses, sighting.place, f"the target {sighting.name}", "rows")
-    found = mounts(problem.robot)
-    _check_units(problem)
+    found, places = mounts(problem.robot), predicted_places(problem)
+    _check_units(problem, places)
     known = [s for s in problem.targets.sightings if _is_known(problem, found[s.name])]
     for one, other in combinations(known, 2):
-        _check_names(problem, one, other)
+        _check_names(problem, places, one, other)
     for one, other in combinations(problem.targets.sightings, 2):
-        _check_some_names(problem, one, other)
+        _check_some_names(problem, places, one, other)
     _check_contradictions(problem, known)
 
 
@@ -104,7 +105,7 @@ def _is_known(problem: PoseSet, mount: Mount) -> bool:
     return mount.owner == TOOL or not is_open(problem.robot, mount.owner)
 
 
-def _check_units(problem: PoseSet) -> None:
+def _check_units(problem: PoseSet, places: Mapping[str, Array]) -> None:
     """Some targets may be in millimetres; where all are, that is told of the first."""
     assert problem.robot.poses is not None
     (tool, _), found, wrong = tool_seen(problem), mounts(problem.robot), []
@@ -112,7 +113,7 @@ def _check_units(problem: PoseSet) -> None:
     for s in problem.targets.sightings:
         there = np.isfinite(s.place[:, 0])
         # a place on the tool that was found from these very positions says nothing of their unit
-        expected = found[s.name].on(tool).target if s.name in unknown else predicted_places(problem, s.name)
+        expected = found[s.name].on(tool).target if s.name in unknown else places[s.name]
         apart = [float(np.linalg.norm(np.std(x[there], axis=0))) for x in (s.place, expected)]
         if there.sum() >= FEWEST and MILLI[0] < apart[0] / max(apart[1], 1e-12) < MILLI[1]:
             wrong.append(s.name)
@@ -129,13 +130,10 @@ def _some(problem: PoseSet, far: NDArray[np.bool_]) -> str:
     return ", ".join(names[:5]) + f" and {len(names) - 5} more" * (len(names) > 5)
 
 
-def _check_some_names(problem: PoseSet, one: Sighting, other: Sighting) -> None:
+def _check_some_names(problem: PoseSet, places: Mapping[str, Array], one: Sighting, other: Sighting) -> None:
     """Two targets may have each other's name in some poses: the way from one to the other is turned round there."""
     there = np.isfinite(one.place[:, 0]) & np.isfinite(other.place[:, 0])
-    predicted, seen = (
-        predicted_places(problem, one.name) - predicted_places(problem, other.name),
-        one.place - other.place,
-    )
+    predicted, seen = places[one.name] - places[other.name], one.place - other.place
     with np.errstate(invalid="ignore"):
         right, turned = (np.linalg.norm(seen - sign * predicted, axis=1) for sign in (1.0, -1.0))
         wrong = there & (right > FAR) & (turned < MUCH_BETTER * right)
@@ -146,14 +144,14 @@ def _check_some_names(problem: PoseSet, one: Sighting, other: Sighting) -> None:
         )
 
 
-def _check_names(problem: PoseSet, one: Sighting, other: Sighting) -> None:
+def _check_names(problem: PoseSet, places: Mapping[str, Array], one: Sighting, other: Sighting) -> None:
     """Two targets may have each other's name: with both the other way round a tracker fits somewhere."""
     there = np.isfinite(one.place[:, 0]) & np.isfinite(other.place[:, 0])
     if there.sum() < FEWEST:
         return
-    predicted = np.concatenate([predicted_places(problem, s.name)[there] for s in (one, other)])
-    places = [one.place[there], other.place[there]]
-    left, exchanged = (base_from_tracker(predicted, np.concatenate(each))[1] for each in (places, places[::-1]))
+    predicted = np.concatenate([places[s.name][there] for s in (one, other)])
+    seen = [one.place[there], other.place[there]]
+    left, exchanged = (base_from_tracker(predicted, np.concatenate(each))[1] for each in (seen, seen[::-1]))
     if left > FAR and exchanged < MUCH_BETTER * left:
         raise RecordingError(
             f"{problem.poses.path}: the targets {one.name} and {other.name} seem to be exchanged: with both the other "
@@ -176,7 +174,7 @@ def _check_contradictions(problem: PoseSet, known: list[Sighting]) -> None:
 def _check_place(problem: PoseSet, sighting: Sighting, mount: Mount) -> None:
     point = mount.on(tool_seen(problem)[0])
     there = np.isfinite(sighting.place[:, 0])
-    away = (sighting.place - predicted_places(problem, sighting.name))[there]
+    away = (sighting.place - predicted_places(problem)[sighting.name])[there]
     misses = float(np.sqrt(np.mean(np.sum(away**2, axis=1))))
     if there.sum() < FEWEST or misses < LARGEST_ERROR:
         return

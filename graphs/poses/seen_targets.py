@@ -196,6 +196,24 @@ def mounts(robot: Robot) -> dict[str, Mount]:
     return found
 
 
+def places_on(robot: Robot, point: SaggingPoint, values: Mapping[str, float]) -> dict[str, Array]:
+    """Places of all targets of a robot, shape (m, 3) [m] each, in the axes that the arm is given in.
+
+    Args:
+        robot: with its targets.
+        point: the arm at some poses, with the other links that carry targets.
+        values: of all parameters.
+    """
+    found = mounts(robot)
+    first = next(iter(found.values()))
+
+    def place(mount: Mount) -> Array:
+        link = mount.on(point)
+        return np.asarray(link.target + link.turn @ mount.away(first, values))
+
+    return {name: place(mount) for name, mount in found.items()}
+
+
 def _turn(point: SaggingPoint, values: Mapping[str, float], mount: Mount, measured: Array) -> Block:
     """The turn from the measured orientation of a target to the predicted one."""
     point = mount.on(point)

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from jointscope.factors.calibration import DYNAMICS, Calibration
 from jointscope.graphs.poses.pose_set import PoseSet
 from jointscope.graphs.poses.sagging_arm import SaggingPoint, in_tracker
-from jointscope.graphs.poses.seen_targets import Mount, mounts
+from jointscope.graphs.poses.seen_targets import Mount, mounts, places_on
 from jointscope.robots.bodies.misplaced_joints import ANGLES, LENGTHS
 from jointscope.robots.errors import RecordingError
 from jointscope.robots.geometry.error_parameters import TOOL
@@ -78,12 +78,10 @@ def _with_trackers(robot: Robot, sessions: Sequence[Poses]) -> tuple[Robot, list
 def _known_points(problem: PoseSet) -> tuple[Array, Array]:
     """Places of targets that are known on the tool: predicted in the base frame, and measured, shape (s, 3) each."""
     values, robot = problem.values(Calibration.of(problem.robot)), problem.robot
-    point, (first, *others) = problem.arm.at(problem.q, np.zeros_like(problem.q), values, True), mounts(robot).items()
-    predicted = {first[0]: point.target}
-    for name, mount in others:
-        if not is_open(robot, mount.owner):
-            link = mount.on(point)
-            predicted[name] = link.target + link.turn @ mount.away(first[1], values)
+    point = problem.arm.at(problem.q, np.zeros_like(problem.q), values, True)
+    first, *others = mounts(robot).items()
+    told = {first[0], *(name for name, mount in others if not is_open(robot, mount.owner))}
+    predicted = {name: place for name, place in places_on(robot, point, values).items() if name in told}
     seen = [sighting for sighting in problem.targets.sightings if sighting.name in predicted]
     known = [(predicted[s.name], s.place, np.isfinite(s.place[:, 0])) for s in seen]
     if not known:
@@ -158,17 +156,15 @@ def tool_seen(problem: PoseSet) -> tuple[SaggingPoint, dict[str, float]]:
     return in_tracker(point, problem.tracker, values, problem.poses.shares), values
 
 
-def predicted_places(problem: PoseSet, name: str) -> Array:
-    """Places of a target in the axes of the tracker at the robot's values, shape (m, 3)."""
-    (point, values), found = tool_seen(problem), mounts(problem.robot)
-    first, link = next(iter(found.values())), found[name].on(point)
-    return np.asarray(link.target + link.turn @ found[name].away(first, values))
+def predicted_places(problem: PoseSet) -> dict[str, Array]:
+    """Places of all targets in the axes of the tracker at the robot's values, shape (m, 3) each."""
+    return places_on(problem.robot, *tool_seen(problem))
 
 
 def tracker_by(problem: PoseSet, some: Sequence[Sighting]) -> tuple[Array, float]:
     """Base from tracker, shape (4, 4), by some targets alone, and how well it fits [m]."""
-    seen = [np.isfinite(s.place[:, 0]) for s in some]
-    predicted = [predicted_places(problem, s.name)[there] for s, there in zip(some, seen, strict=True)]
+    seen, places = [np.isfinite(s.place[:, 0]) for s in some], predicted_places(problem)
+    predicted = [places[s.name][there] for s, there in zip(some, seen, strict=True)]
     measured = np.concatenate([s.place[there] for s, there in zip(some, seen, strict=True)])
     T, left, _ = base_from_tracker(np.concatenate(predicted), measured)
     return np.asarray(problem.tracker @ T), left

@@ -10,9 +10,10 @@ from itertools import islice
 import numpy as np
 import pinocchio as pin
 import pytest
+from slopes_of_rows import checked_slopes
 from tools_with_targets import tool_with
 
-from jointscope.factors.calibration import DYNAMICS, Calibration
+from jointscope.factors.calibration import Calibration
 from jointscope.graphs.poses.calibrate_poses import _estimate, calibrate_poses
 from jointscope.graphs.poses.linear_poses import LinearPoses
 from jointscope.graphs.poses.pose_set import PoseSet
@@ -66,27 +67,9 @@ def with_holes(poses, seed=1):
 
 
 def test_derivatives_of_all_rows_are_those_of_what_is_missed(robot, oriented):
-    robot, (problem,) = placed(robot, [with_holes(oriented)])
-    start = Calibration.of(robot).only([DYNAMICS])
-    rng = np.random.default_rng(0)
-    step = 0.3 * np.array([min(robot.parameters[n].coordinate_sigma, 0.1) for n in start.names])
-    calibration = start.retract({DYNAMICS: step * rng.standard_normal(len(step))})
-    e = 1e-3 * rng.standard_normal(problem.q.shape)
-    point = problem.point(calibration, e)
-    J, size = problem.columns(point, calibration), 1e-6
-
-    def missed(at, errors):
-        return problem.misses(problem.point(at, errors), at)
-
-    for i in range(len(step)):
-        d = size * np.eye(len(step))[i]
-        ends = [missed(calibration.retract({DYNAMICS: sign * d}), e) for sign in (1.0, -1.0)]
-        np.testing.assert_allclose(J[:, :, i], (ends[0] - ends[1]) / (2.0 * size), atol=2e-6, err_msg=start.names[i])
-    for j in range(e.shape[1]):
-        d = size * np.eye(e.shape[1])[j]
-        ends = [missed(calibration, e + sign * d) for sign in (1.0, -1.0)]
-        np.testing.assert_allclose(point.by_joint[:, :, j], (ends[0] - ends[1]) / (2.0 * size), atol=2e-6)
-    assert not np.any(J[~problem.targets.there]) and not np.any(missed(calibration, e)[~problem.targets.there])
+    problem, columns, missed = checked_slopes(robot, with_holes(oriented))
+    unseen = ~problem.targets.there
+    assert not any(np.any(column[unseen]) for column in columns.values()) and not np.any(missed[unseen])
 
 
 def test_rows_of_one_pose_share_what_its_transmissions_do(robot, oriented):

@@ -8,9 +8,10 @@ from dataclasses import replace
 import numpy as np
 import pinocchio as pin
 import pytest
+from slopes_of_rows import checked_slopes
 from tools_with_targets import tool_with
 
-from jointscope.factors.calibration import DYNAMICS, Calibration
+from jointscope.factors.calibration import Calibration
 from jointscope.graphs.poses.calibrate_poses import calibrate_poses
 from jointscope.graphs.poses.seen_targets import mounts
 from jointscope.graphs.poses.tip_errors import tip_errors
@@ -54,34 +55,9 @@ def off(result, truth, names):
     return np.array([(parameters[n].value - truth[n]) / parameters[n].sigma for n in names])
 
 
-def checked_slopes(robot, poses):
-    """Derivatives of all rows against differences, at values that are off, and those by what transmissions do."""
-    robot, (problem,) = placed(robot, [poses])
-    start = Calibration.of(robot).only([DYNAMICS])
-    rng = np.random.default_rng(0)
-    step = 0.3 * np.array([min(robot.parameters[n].coordinate_sigma, 0.1) for n in start.names])
-    calibration = start.retract({DYNAMICS: step * rng.standard_normal(len(step))})
-    e, size = 1e-3 * rng.standard_normal(problem.q.shape), 1e-6
-    point = problem.point(calibration, e)
-    J = problem.columns(point, calibration)
-
-    def missed(at, errors):
-        return problem.misses(problem.point(at, errors), at)
-
-    for i in range(len(step)):
-        d = size * np.eye(len(step))[i]
-        ends = [missed(calibration.retract({DYNAMICS: sign * d}), e) for sign in (1.0, -1.0)]
-        np.testing.assert_allclose(J[:, :, i], (ends[0] - ends[1]) / (2.0 * size), atol=2e-6, err_msg=start.names[i])
-    for j in range(e.shape[1]):
-        d = size * np.eye(e.shape[1])[j]
-        ends = [missed(calibration, e + sign * d) for sign in (1.0, -1.0)]
-        np.testing.assert_allclose(point.by_joint[:, :, j], (ends[0] - ends[1]) / (2.0 * size), atol=2e-6)
-    return problem, dict(zip(start.names, np.moveaxis(J, 2, 0), strict=True))
-
-
 def test_derivatives_of_targets_on_three_links_are_those_of_what_is_missed(robot):
     poses = simulate_poses(robot, 12, 3, PoseConditions(orientation=True))[0]
-    problem, columns = checked_slopes(robot, poses)
+    problem, columns, _ = checked_slopes(robot, poses)
     rows = {owner: np.flatnonzero([o == owner for o in problem.targets.owners]) for owner in ("elbow", "reflector")}
     behind = max(np.abs(columns[name][:, rows["elbow"]]).max() for name in BEHIND)
     assert 0.0 < behind < 1e-2  # joints behind a link move it by their weight alone
@@ -92,7 +68,7 @@ def test_derivatives_of_targets_on_three_links_are_those_of_what_is_missed(robot
 def test_derivatives_of_a_first_target_with_weight_behind_it_are_those_of_what_is_missed(tmp_path):
     robot = on_third_link(tmp_path)
     assert robot.poses.link == "link3"
-    _, columns = checked_slopes(robot, simulate_poses(robot, 12, 3)[0])
+    _, columns, _ = checked_slopes(robot, simulate_poses(robot, 12, 3)[0])
     assert max(np.abs(columns[name]).max() for name in BEHIND) < 1e-2 < np.abs(columns["joint3.lx"]).max()
 
 
@@ -102,7 +78,7 @@ def test_a_payload_at_a_target_pulls_at_the_joints_that_carry_it_only(tmp_path):
     path.write_text(path.read_text(encoding="utf-8").rstrip("\n") + f"\n{line}", encoding="utf-8")
     robot = load_robot(path)
     robot = robot.with_values({"robot.payload.mass": 5.0})
-    _, columns = checked_slopes(robot, simulate_poses(robot, 12, 3)[0])
+    _, columns, _ = checked_slopes(robot, simulate_poses(robot, 12, 3)[0])
     assert np.abs(columns["robot.payload.mass"]).max() > 1e-6
 
 
