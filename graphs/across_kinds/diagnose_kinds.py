@@ -26,19 +26,16 @@ from jointscope.graphs.across_kinds.said_by_kinds import (
 from jointscope.graphs.calibration.base_model import BaseModel
 from jointscope.graphs.discovery.diagnose import diagnose
 from jointscope.graphs.discovery.diagnosis_result import Diagnosis
+from jointscope.graphs.discovery.side_by_side import solver_of
 from jointscope.graphs.discovery.starting_model import starting_model
 from jointscope.graphs.joint_kinds.arm_candidates import Calibrated
 from jointscope.graphs.joint_kinds.discover_arm import calibrated, diagnosed
 from jointscope.graphs.joint_kinds.effect_judge import ArmCandidate
 from jointscope.graphs.rest_search.discover_rests import RestDiscovery, diagnose_rests
-from jointscope.graphs.solving.batch_solver import Progress, solve
+from jointscope.graphs.solving.batch_solver import Progress
 from jointscope.graphs.solving.solver_context import in_solver_context
 from jointscope.robots.geometry.arm_effects import FREQUENCY
 from jointscope.robots.model.robot import Robot
-from jointscope.robots.recordings.poses import Poses
-from jointscope.robots.recordings.recording import Recording
-from jointscope.robots.recordings.signals import Excitation, Signals
-from jointscope.robots.rests.rests import Rests
 
 
 @dataclass(frozen=True)
@@ -87,12 +84,8 @@ class KindsDiagnosis:
 
 def diagnose_kinds(
     robot: Robot,
-    recordings: Sequence[Recording] = (),
-    holdout: Recording | None = None,
-    sessions: Sequence[Poses] = (),
-    shaken: Sequence[tuple[Signals, Excitation]] = (),
-    rests: Sequence[Rests] = (),
-    rests_holdout: Sequence[Rests] = (),
+    given: KindsRecordings,
+    held: KindsRecordings | None = None,
     progress: Progress | None = None,
     **options: Any,
 ) -> KindsDiagnosis:
@@ -100,20 +93,16 @@ def diagnose_kinds(
 
     Args:
         robot: with what each of the kinds needs.
-        recordings: of motion.
-        holdout: of motion; is scored and never chooses.
-        sessions: poses, as of `calibrate_poses`.
-        shaken: as of `calibrate_frequency`.
-        rests: of each recording.
-        rests_holdout: rests that are scored and never choose.
+        given: recordings for training.
+        held: those that are scored and never choose.
         progress: called with a text and the share done.
         options: of `diagnose`, for the recordings of motion.
 
     Raises:
+        RecordingError: what is held out is also for training.
         JointscopeError: as of `diagnose`, `calibrate_kinds` and `diagnose_rests`.
     """
-    held = KindsRecordings(motion=() if holdout is None else (holdout,), rests=tuple(rests_holdout))
-    given = KindsRecordings(tuple(recordings), tuple(sessions), tuple(shaken), tuple(rests))
+    held = held or KindsRecordings()
     given.must_be_apart(held)
     return ask_kinds(robot, given, held, progress or (lambda text, share: None), options)
 
@@ -169,8 +158,7 @@ def _moving(
     near: BaseModel | None,
 ) -> tuple[Diagnosis, BaseModel]:
     """What the recordings of motion say, and the model calibrated with them."""
-    workers = options.get("side_by_side")
-    solver = solve if workers is None else workers.solver
+    solver = solver_of(options.get("side_by_side"))
     report("calibrating with motion", 0.3)
     if near is None:
         base = starting_model(robot, given.motion, solver)

@@ -24,8 +24,9 @@ from jointscope.graphs.across_kinds.shared_model import (
     errors_by_kind,
     heldout_by_kind,
 )
+from jointscope.graphs.discovery.side_by_side import solver_of
 from jointscope.graphs.discovery.verdicts import MATTERS, SAME, SURE
-from jointscope.graphs.solving.batch_solver import Progress, solve
+from jointscope.graphs.solving.batch_solver import Progress
 from jointscope.graphs.solving.solver_context import in_solver_context
 from jointscope.robots.errors import JointscopeError, RecordingError
 from jointscope.robots.model.robot import Robot
@@ -124,8 +125,7 @@ class _Search:
     def __init__(self, given: KindsRecordings, held: KindsRecordings, report: Progress, options: Mapping[str, Any]):
         self.given, self.held, self.report = given, held, report
         self.options = {"each_held_out": False, **options}
-        workers = options.get("side_by_side")
-        self.solver = solve if workers is None else workers.solver
+        self.solver = solver_of(options.get("side_by_side"))
         self.steps: list[KindsStep] = []
 
     def run(self, robot: Robot) -> KindsDiscovery:
@@ -143,7 +143,7 @@ class _Search:
 
     def _grown(self, refused: dict[str, str]) -> tuple[AcrossKinds, SharedModel] | None:
         """The effect that comes in, and the model with it; None, and why, where none does."""
-        last = self.steps[-1]
+        last, was = self.steps[-1], dict[str, float]()
         if self._added >= MOST_STEPS:
             return None
         while (candidate := leading(last.found, refused)) is not None:
@@ -154,15 +154,15 @@ class _Search:
             except JointscopeError as err:
                 refused[label] = f"cannot be calibrated with all kinds ({err})"
                 continue
-            worse = self._why_not(candidate, last.model, model)
+            was = was or errors_by_kind(last.model, self.given, last.model)
+            worse = self._why_not(candidate, was, errors_by_kind(model, self.given, last.model))
             if not worse:
                 return candidate, model
             refused[label] = worse
         return None
 
-    def _why_not(self, candidate: AcrossKinds, before: SharedModel, after: SharedModel) -> str:
-        """What speaks against an effect once all kinds are in one graph; empty if nothing does."""
-        was, now = (errors_by_kind(model, self.given, before) for model in (before, after))
+    def _why_not(self, candidate: AcrossKinds, was: Mapping[str, float], now: Mapping[str, float]) -> str:
+        """What speaks against an effect once all kinds are in one graph, by errors; empty if nothing does."""
         # kinds that cannot show it may give way while they lack something else: they have no say
         told = [kind for kind in candidate.seen_by if not _by_friction(kind, self.given)]
         worse = [kind for kind in told if now[kind] ** 2 > (1.0 + SAME) ** 2 * was[kind] ** 2]

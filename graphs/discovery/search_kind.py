@@ -12,12 +12,12 @@ from jointscope.graphs.comparison.compare import compare_model
 from jointscope.graphs.comparison.comparison_result import ModelComparison
 from jointscope.graphs.discovery.diagnose import diagnose
 from jointscope.graphs.discovery.diagnosis_result import Diagnosis
-from jointscope.graphs.discovery.side_by_side import SideBySide
+from jointscope.graphs.discovery.side_by_side import SideBySide, solver_of
 from jointscope.graphs.discovery.starting_model import starting_model
 from jointscope.graphs.discovery.unexplained import believed_floor
 from jointscope.graphs.discovery.verdicts import MATTERS
 from jointscope.graphs.refits.validation import ValidationError, fit_and_judge, judged_error
-from jointscope.graphs.solving.batch_solver import Progress, solve
+from jointscope.graphs.solving.batch_solver import Progress
 from jointscope.robots.model.robot import Robot
 from jointscope.robots.recordings.recording import Recording
 
@@ -67,7 +67,7 @@ class Motion:
 
     def calibrated(self, robot: Robot, start: BaseModel | None = None) -> BaseModel:
         """All components of every gyro are predicted."""
-        solver = self.side_by_side.solver if self.side_by_side is not None else solve
+        solver = solver_of(self.side_by_side)
         if start is None:
             return starting_model(with_full_gyros(robot), self.recordings, solver)
         return BaseModel.of(robot, self.recordings, start, solver=solver)

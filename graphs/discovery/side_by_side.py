@@ -18,6 +18,7 @@ from pathlib import Path
 from types import TracebackType
 from typing import Any, TypeVar
 
+from jointscope.graphs.solving.batch_solver import Solver, solve
 from jointscope.graphs.spread.spread_solver import SpreadSolver
 from jointscope.graphs.workers.crew import WorkerLost
 from jointscope.graphs.workers.dask_cluster import DaskCluster
@@ -28,6 +29,11 @@ R = TypeVar("R")
 
 ATTEMPTS = 2  # times that a task is given to processes before it is done here
 _known: dict[str, Any] = {}  # in a worker: what its last task needed, by file
+
+
+def solver_of(workers: SideBySide | None) -> Solver:
+    """Who minimises the cost of all samples: workers, where there are any."""
+    return solve if workers is None else workers.solver
 
 
 class SideBySide:

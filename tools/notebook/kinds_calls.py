@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, TypeVar
 
-from jointscope.graphs.across_kinds.diagnose_kinds import ask_kinds
+from jointscope.graphs.across_kinds.diagnose_kinds import diagnose_kinds
 from jointscope.graphs.across_kinds.discover_kinds import discover_kinds
 from jointscope.graphs.across_kinds.kinds_recordings import KindsRecordings
 from jointscope.graphs.solving.batch_solver import Progress
@@ -76,8 +76,7 @@ def diagnosed(
         JointscopeError: as of `diagnose`, or kinds that have one graph.
     """
     model, given, held = _read(robot, recordings, holdout, still, leave_out)
-    found = ask_kinds(model, given, held, progress or (lambda text, share: None), options)
-    return KindsDiagnosed.of(found, given=given, held=held)
+    return KindsDiagnosed.of(diagnose_kinds(model, given, held, progress, **options), given=given, held=held)
 
 
 def discovered(
@@ -122,7 +121,6 @@ def _read(
         raise RecordingError("holdout and leave_out are of motion, of which no recording is given; leave them out")
     given = KindsRecordings(tuple(motion), **still.read(model))
     apart = KindsRecordings(() if held is None else (held,), **(still.holdout or Still()).read(model))
-    given.must_be_apart(apart)
     return model, given, apart
 
 

@@ -15,7 +15,7 @@ from jointscope.tools.acceptance.evaluation import AcceptedBy
 from jointscope.tools.acceptance.limits import Limit
 from jointscope.tools.terminal.progress import Progress
 from jointscope.tools.verb_parts.result_files import ResultFiles, refuse_viewer, write_found
-from jointscope.tools.writing.origin import made_from
+from jointscope.tools.writing.origin import counted, made_from
 
 
 def check_one_kind(
@@ -187,5 +187,5 @@ def _turn_noise(result: Any) -> dict[str, float]:
 
 def pose_origin(result: Any, start: Robot) -> dict[str, Any]:
     """Where a calibration from poses comes from."""
-    poses = [{"path": p.poses.path, "sha256": p.poses.sha256, "count": len(p.poses)} for p in result.problems]
+    poses = [counted(p.poses) for p in result.problems]
     return made_from(start.path.name) | {"poses": poses}

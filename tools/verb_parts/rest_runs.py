@@ -17,7 +17,7 @@ from jointscope.tools.terminal.progress import Progress
 from jointscope.tools.verb_parts.frequency_runs import agreement_json, frequency_origin, kinds_json, read_all_shaken
 from jointscope.tools.verb_parts.pose_runs import pose_json, pose_origin, urdf_files
 from jointscope.tools.verb_parts.result_files import ResultFiles, refuse_viewer, write_found
-from jointscope.tools.writing.origin import made_from, other_kinds
+from jointscope.tools.writing.origin import counted, made_from, other_kinds
 
 if TYPE_CHECKING:
     from jointscope.graphs.locked_springs.coupling import Coupling
@@ -92,8 +92,7 @@ def coupling_json(coupling: Coupling | None) -> dict[str, Any]:
 
 
 def _locked_origin(coupling: Coupling) -> dict[str, Any]:
-    each = [readings for fit in coupling.fits for readings in fit.readings]
-    return {"locked_springs": [{"path": r.path, "sha256": r.sha256, "count": len(r)} for r in each]}
+    return {"locked_springs": [counted(readings) for fit in coupling.fits for readings in fit.readings]}
 
 
 def run_locked_calibration(

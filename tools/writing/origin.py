@@ -13,6 +13,8 @@ from jointscope.robots.recordings.recording import Recording
 
 KINDS = ("bags", "rests", "poses", "frequency", "locked_springs")
 """Keys under which recordings stand."""
+COUNTED = {"rests": "rests", "poses": "poses", "locked_springs": "readings"}
+"""Kinds whose samples are counted, and where a set of each has its recording."""
 
 
 def provenance(result: Any) -> dict[str, Any]:
@@ -27,16 +29,15 @@ def provenance(result: Any) -> dict[str, Any]:
 
 def other_kinds(result: Any) -> dict[str, Any]:
     """Rests, poses, frequency responses and locked springs that a calibration used beside motion."""
-    still = [(p.kind, getattr(p, p.kind)) for p, *_ in result.sets if p.kind in ("rests", "poses")]
-    found: dict[str, Any] = {}
-    for kind, each in still:
-        found.setdefault(kind, []).append({"path": each.path, "sha256": each.sha256, "count": len(each)})
-    for p, *_ in result.sets:
-        if p.kind == "locked_springs":
-            each = {"path": p.readings.path, "sha256": p.readings.sha256, "count": len(p.readings)}
-            found.setdefault(p.kind, []).append(each)
+    every = {k: [counted(getattr(p, at)) for p, *_ in result.sets if p.kind == k] for k, at in COUNTED.items()}
+    found: dict[str, Any] = {kind: each for kind, each in every.items() if each}
     shaken = [one.pose for p, *_ in result.sets if p.kind == "frequency" for one in p.problems]
     return found | ({"frequency": [{"path": p.path, "sha256": p.sha256} for p in shaken]} if shaken else {})
+
+
+def counted(recording: Any) -> dict[str, Any]:
+    """A recording without motion, and how many rests, poses or instants of it count."""
+    return {"path": recording.path, "sha256": recording.sha256, "count": len(recording)}
 
 
 def step_provenance(step: Any, index: int, start: str, recordings: Sequence[Recording]) -> dict[str, Any]:

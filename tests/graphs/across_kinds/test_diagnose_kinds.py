@@ -12,6 +12,7 @@ from resting_axes import stiff_axes
 
 from jointscope import simulate
 from jointscope.graphs.across_kinds.diagnose_kinds import diagnose_kinds
+from jointscope.graphs.across_kinds.kinds_recordings import KindsRecordings
 from jointscope.tools.bags.write_bag import write_bag
 from jointscope.tools.command_line import main
 from jointscope.tools.simulator.pose_simulation import PoseConditions, simulate_poses
@@ -38,7 +39,8 @@ def by_label(found):
 
 def test_loads_that_are_wrong_are_shown_by_rests_and_motion_bars_what_rests_take_for_them(rod):
     rests = hanging(40, 3, rigid=True)
-    found = diagnose_kinds(rod, [moved(rod)], rests=[replace(rests, forces=0.9 * rests.forces)], missing_torque=False)
+    given = KindsRecordings((moved(rod),), rests=(replace(rests, forces=0.9 * rests.forces),))
+    found = diagnose_kinds(rod, given, missing_torque=False)
     assert kinds_headline(found) == "Missing: load_scale@robot, shown by rests."
     effects = by_label(found)
     value, sigma, _ = effects["load_scale@robot"].by_kind["rests"].sizes["share"]
@@ -50,7 +52,8 @@ def test_loads_that_are_wrong_are_shown_by_rests_and_motion_bars_what_rests_take
 
 @pytest.mark.slow
 def test_nothing_is_missing_in_a_true_model(rod):
-    found = diagnose_kinds(rod, [moved(rod)], rests=[hanging(40, 3, rigid=True)], missing_torque=False)
+    given = KindsRecordings((moved(rod),), rests=(hanging(40, 3, rigid=True),))
+    found = diagnose_kinds(rod, given, missing_torque=False)
     assert found.adequate and kinds_headline(found) == "Nothing of the catalogue is missing in motion and rests."
     assert not [c.label for c in found.candidates if c.verdict == "missing"]
 
@@ -59,9 +62,8 @@ def test_nothing_is_missing_in_a_true_model(rod):
 def test_what_rests_alone_would_name_wrongly_is_explained_by_what_motion_shows(rod):
     rests = hanging(40, 3, rigid=True)  # an offset that helps the motor takes as much from its command
     bent = replace(rests, u=rests.u - OFFSET)
-    found = diagnose_kinds(
-        rod, [moved(rod, [f"torque_offset@swing:torque={OFFSET}"])], rests=[bent], missing_torque=False
-    )
+    given = KindsRecordings((moved(rod, [f"torque_offset@swing:torque={OFFSET}"]),), rests=(bent,))
+    found = diagnose_kinds(rod, given, missing_torque=False)
     assert kinds_headline(found) == "Missing: torque_offset@swing or asymmetric_friction@swing, shown by motion."
     assert next(c.label for c in found.rests.candidates if c.verdict == "missing") == "encoder_offset@swing"
     assert by_label(found)["encoder_offset@swing"].verdict == "possible"
@@ -74,9 +76,8 @@ def test_what_rests_alone_would_name_wrongly_is_explained_by_what_motion_shows(r
 def test_an_offset_that_only_the_motion_has_is_a_contradiction(rod):
     rests = hanging(40, 3, rigid=True)
     other = replace(rests, u=rests.u + OFFSET)
-    found = diagnose_kinds(
-        rod, [moved(rod, [f"torque_offset@swing:torque={OFFSET}"])], rests=[other], missing_torque=False
-    )
+    given = KindsRecordings((moved(rod, [f"torque_offset@swing:torque={OFFSET}"]),), rests=(other,))
+    found = diagnose_kinds(rod, given, missing_torque=False)
     friction = by_label(found)["asymmetric_friction@swing"]
     assert friction.shown_by == ("motion", "rests") == friction.against
     assert kinds_headline(found).startswith("The model lacks something, but no effect")
@@ -115,7 +116,7 @@ def test_motion_and_poses_of_an_arm_show_what_the_other_cannot(tmp_path):
     motion = simulate(
         robot, seconds=6.0, seed=3, encoder_rate=250.0, effects=constant, parameters=dry, friction="smooth"
     ).recording
-    found = diagnose_kinds(robot, [motion], sessions=[poses], missing_torque=False)
+    found = diagnose_kinds(robot, KindsRecordings((motion,), (poses,)), missing_torque=False)
     said = "Missing: torque_constant_error@joint2, shown by motion; tracker_drift@robot, shown by poses."
     assert kinds_headline(found) == said
     effects = by_label(found)

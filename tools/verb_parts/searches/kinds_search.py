@@ -18,7 +18,7 @@ from jointscope.tools.verb_parts.rest_runs import read_all_rests
 from jointscope.tools.verb_parts.result_files import ResultFiles, write_diagnosis, write_still
 from jointscope.tools.verb_parts.searches import arm_search, rest_search
 from jointscope.tools.verb_parts.workers import check_workers
-from jointscope.tools.writing.origin import made_from, origin
+from jointscope.tools.writing.origin import counted, made_from, origin
 from jointscope.tools.writing.whole_file import write_json
 
 if TYPE_CHECKING:
@@ -48,13 +48,13 @@ def run_kinds_diagnosis(
         RobotError: pictures were asked for, and there is no motion.
         JointscopeError: the recordings cannot be used, or a file cannot be written; then none is.
     """
-    from jointscope.graphs.across_kinds.diagnose_kinds import ask_kinds
+    from jointscope.graphs.across_kinds.diagnose_kinds import diagnose_kinds
     from jointscope.graphs.joint_kinds.discover_arm import scored
     from jointscope.tools.terminal.searches.kinds_text import kinds_text
 
     _must_have_motion(bool(args.bags), robot, files)
     given, held = _read(robot, args, workers, progress)
-    found = ask_kinds(robot, given, held, progress, {"missing_torque": files.pictures, "side_by_side": workers})
+    found = diagnose_kinds(robot, given, held, progress, missing_torque=files.pictures, side_by_side=workers)
     arm = None if found.arm_base is None else scored(found.arm_base, found.arm, held.poses, held.shaken)
     write_kinds_diagnosis(found, arm, files)
     return kinds_text(found, arm)
@@ -179,12 +179,8 @@ def must_have_sections(robot: Robot, moving: bool, posed: bool, shaken: bool) ->
 
 def _still_origin(given: KindsRecordings) -> dict[str, Any]:
     """Recordings without motion, as the origin of a result has them."""
-    counted: dict[str, Sequence[Any]] = {"rests": given.rests, "poses": given.poses}
-    found: dict[str, Any] = {
-        kind: [{"path": one.path, "sha256": one.sha256, "count": len(one)} for one in each]
-        for kind, each in counted.items()
-        if each
-    }
+    still: dict[str, Sequence[Any]] = {"rests": given.rests, "poses": given.poses}
+    found: dict[str, Any] = {kind: [counted(one) for one in each] for kind, each in still.items() if each}
     shaken = [{"path": signals.path, "sha256": signals.sha256} for signals, _ in given.shaken]
     return found | ({"frequency": shaken} if shaken else {})
 
