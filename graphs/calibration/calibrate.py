@@ -204,11 +204,8 @@ def _asked_for_causes(
     result: CalibrationResult, solved: Solved, stage: WholeStage | None, recordings: Sequence[Recording]
 ) -> CalibrationResult:
     """With what a linear step says of late signals, of masses and, with a stage to try more, of the whole catalogue."""
-    suspects = Suspects.of(solved.robot) if stage else None
-    if suspects is not None and (windows := tested_on_windows(solved)) is not None:
-        suspects = suspects.left_by(windows)
-        windows = None  # it is large, and so is the test of all samples
-        give_back_memory()
+    suspects = _suspects(solved) if stage else None
+    give_back_memory()  # that of windows, before all samples need as much
     test = ScoreTest.of(*solved.of_motions, solved.eliminations)
     lacking = lacking_effects(test, suspects) if suspects is not None else ()
     smoothed = lacking_filter(stage, solved) if stage else None
@@ -225,6 +222,12 @@ def _asked_for_causes(
     return replace(
         result, asked=asked_by_regression(replace(result.robot, sensors=result.start.sensors), recordings, test)
     )
+
+
+def _suspects(solved: Solved) -> Suspects:
+    """What a part of the samples does not rule out, where there are many."""
+    suspects, windows = Suspects.of(solved.robot), tested_on_windows(solved)
+    return suspects if windows is None else suspects.left_by(windows)
 
 
 def check_recordings(robot: Robot, recordings: Sequence[Recording], every_joint: bool = True) -> list[Notice]:

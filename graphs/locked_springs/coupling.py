@@ -193,10 +193,9 @@ def find_coupling(robot: Robot, readings: Sequence[LockedReadings]) -> Coupling:
         told = np.zeros(A.shape, bool)
         told[np.ix_(some[0].rows, ~np.all([r.still for r in some], axis=0))] = True
         variance[told] = variance[:, :, told] = 0.0
-        places = [(int(some[0].rows[k]), int(j)) for k, j in np.argwhere(fit.free)]
-        for a, (i, j) in enumerate(places):
-            for b, (k, m) in enumerate(places):
-                variance[i, j, k, m] = fit.covariance[a, b]
+        own, j = np.nonzero(fit.free)
+        i = some[0].rows[own]
+        variance[i[:, None], j[:, None], i, j] = fit.covariance[: len(i), : len(i)]
         fits.append(fit)
     if np.linalg.cond(A / np.linalg.norm(A, axis=0)) > WORST_CONDITION:
         raise RecordingError(

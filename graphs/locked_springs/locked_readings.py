@@ -7,7 +7,7 @@ on by a step since the last one. The stream with fewer samples gives the instant
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -115,7 +115,7 @@ class LockedReadings:
                 f"{self.path}: motors and links read something new {len(self)} times; expected {needed} for the matrix "
                 "between them: move the joints farther, one after the other"
             )
-        return LockedReadings(**{**self.__dict__, "still": still})
+        return replace(self, still=still)
 
 
 def no_link_encoders(path: str | Path, robot: Robot) -> str:

@@ -6,13 +6,12 @@ from __future__ import annotations
 from collections.abc import Sequence
 from html import escape
 
-import numpy as np
-
 from jointscope.graphs.locked_springs.coupling import Coupling
 from jointscope.tools.acceptance.evaluation import NO_LIMITS, AcceptedBy
-from jointscope.tools.presentation.numbers import significant, with_sigma
+from jointscope.tools.presentation.numbers import significant
 from jointscope.tools.report.page.acceptance import acceptance
 from jointscope.tools.report.page.page import Section, page, table
+from jointscope.tools.terminal.coupling_text import coupling_rows
 
 
 def locked_report(found: Coupling, checked: AcceptedBy = NO_LIMITS, more: Sequence[Section] = ()) -> str:
@@ -29,11 +28,7 @@ def locked_report(found: Coupling, checked: AcceptedBy = NO_LIMITS, more: Sequen
 
 
 def _matrix(found: Coupling) -> Section:
-    rows = []
-    for i, j in np.ndindex(found.matrix.shape):
-        if found.sigmas[i, j] > 0.0:
-            value, sigma = with_sigma(float(found.matrix[i, j]), float(found.sigmas[i, j]))
-            rows.append([escape(found.element(i, j)), significant(float(found.stated[i, j]), 6), value, sigma])
+    rows = [[escape(cell) for cell in row] for row in coupling_rows(found)]
     lead = escape(found.sentence() or "The transmission of the robot file is the one that the locked springs show.")
     head = ["link angle per motor angle", "file", "value", "± sigma"]
     return Section("matrix", "Which motors turn which links?", table(head, rows, (1, 2, 3)), lead)

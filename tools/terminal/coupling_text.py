@@ -24,13 +24,9 @@ def coupling_text(found: Coupling) -> str:
                 f"encoders explain {significant(fit.explained[worst], 2)} {unit}; link encoders are "
                 f"{significant(1e3 * fit.delays[i], 2)} ms late"
             )
-    rows = []
-    for i, j in np.ndindex(found.matrix.shape):
-        if found.sigmas[i, j] > 0.0:
-            value, sigma = with_sigma(float(found.matrix[i, j]), float(found.sigmas[i, j]))
-            rows.append([found.element(i, j), significant(float(found.stated[i, j]), 6), value, sigma])
     zero = sum(int((~fit.free & ~fit.readings[0].still).sum()) for fit in found.fits)
-    lines += [text_table(["link angle per motor angle", "file", "locked springs", "± sigma"], rows, "<>>>")]
+    head = ["link angle per motor angle", "file", "locked springs", "± sigma"]
+    lines += [text_table(head, coupling_rows(found), "<>>>")]
     if zero:
         lines.append(
             f"Nothing else turns a motor: {counted(zero, 'further element')} of the inverse "
@@ -39,3 +35,13 @@ def coupling_text(found: Coupling) -> str:
     wrong = found.sentence()
     lines.append(wrong if wrong else "The transmission of the robot file is the one that the locked springs show.")
     return "\n".join(lines)
+
+
+def coupling_rows(found: Coupling) -> list[list[str]]:
+    """Name, value of the file, value and sigma of each element that was told."""
+    rows = []
+    for i, j in np.ndindex(found.matrix.shape):
+        if found.sigmas[i, j] > 0.0:
+            value, sigma = with_sigma(float(found.matrix[i, j]), float(found.sigmas[i, j]))
+            rows.append([found.element(i, j), significant(float(found.stated[i, j]), 6), value, sigma])
+    return rows

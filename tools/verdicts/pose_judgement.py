@@ -135,7 +135,7 @@ def moved_during(result: PoseCalibration) -> Step | None:
 
 def outliers_of(result: PoseCalibration) -> tuple[Outlier, ...]:
     """What was left out, but for the poses on that side of a step, named by itself, which the fit gave up."""
-    step = moved_during(result)
+    step = moved_during(result) if result.left_out else None
     if step is None:
         return result.left_out
     names = next(problem.poses.names for problem in result.whole if problem.poses.path == step.path)
