@@ -19,6 +19,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from jointscope.factors.calibration import Calibration
 from jointscope.factors.interpolated import InterpolatedFactor
 
 Array = NDArray[np.float64]
@@ -28,19 +29,19 @@ Array = NDArray[np.float64]
 class AcceleratedFactor(InterpolatedFactor):
     """A factor on a state with link accelerations behind it, (x, a), at the times of its samples."""
 
-    def between(self, x0: Array, x1: Array, fraction: Array) -> Array:
+    def between(self, x0: Array, x1: Array, fraction: Array, calibration: Calibration) -> Array:
         """State and link accelerations, shape (m, d + n_link)."""
         q, v = self.layout.q_link, self.layout.v_link
         pairs = (x0[:, q], x0[:, v], x1[:, q], x1[:, v])
         weights = acceleration_weights(fraction, self.h)
         a = sum((w[:, None] * part for w, part in zip(weights, pairs, strict=True)), np.zeros(pairs[0].shape))
-        return np.hstack([super().between(x0, x1, fraction), a])
+        return np.hstack([super().between(x0, x1, fraction, calibration), a])
 
-    def motion(self, x0: Array, x1: Array, fraction: Array) -> Array:
+    def motion(self, x0: Array, x1: Array, fraction: Array, calibration: Calibration) -> Array:
         """Time derivative of `between`; the third derivative of the cubic is constant."""
         q, v, h = self.layout.q_link, self.layout.v_link, self.h[:, None]
         jerk = 12.0 * (x0[:, q] - x1[:, q]) / h**3 + 6.0 * (x0[:, v] + x1[:, v]) / h**2
-        return np.hstack([super().motion(x0, x1, fraction), jerk])
+        return np.hstack([super().motion(x0, x1, fraction, calibration), jerk])
 
     def by_ends(self, J: Array, fraction: Array) -> tuple[Array, Array]:
         """Derivatives by both ends; J is one by (x, a), shape (m, r, d + n_link)."""

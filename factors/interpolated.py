@@ -68,19 +68,21 @@ class InterpolatedFactor(SeenThrough[Factor]):
     def residual(self, x: tuple[Array, ...], calibration: Calibration) -> Array:
         """Residual of the sensor at the interpolated state."""
         fraction, _ = self._fraction(calibration)
-        between = self._smoothed(self.between(x[0], x[1], fraction), x, calibration)
+        between = self._smoothed(self.between(x[0], x[1], fraction, calibration), x, calibration)
         return self.inner.residual((between,), calibration)
 
     def linearize(self, x: tuple[Array, ...], calibration: Calibration) -> Linearization:
         """Residual and derivatives by both states, and by what makes the stamps late."""
         fraction, slopes = self._fraction(calibration)
-        between = self._smoothed(self.between(x[0], x[1], fraction), x, calibration)
+        between = self._smoothed(self.between(x[0], x[1], fraction, calibration), x, calibration)
         inner = self.inner.linearize((between,), calibration)
         J = inner.by_state[0]
         by_block, by_ends = dict(inner.by_block), self.by_ends(J, fraction)
         if slopes:
-            rate = (J @ self.motion(x[0], x[1], fraction)[:, :, None])[:, :, 0]
+            rate = (J @ self.motion(x[0], x[1], fraction, calibration)[:, :, None])[:, :, 0]
             by_block[DYNAMICS] = self._by_parameters(-rate, slopes, by_block, calibration)
+        for name, column in self.behind(J, fraction, calibration).items():
+            by_block[DYNAMICS] = self._by_parameters(column, {name: 1.0}, by_block, calibration)
         variance, smooth = self._variance(calibration)
         if smooth:
             q, v = self.layout.positions, self.layout.velocities
@@ -91,13 +93,17 @@ class InterpolatedFactor(SeenThrough[Factor]):
             by_ends[1][:, :, v] += by_velocity
         return Linearization(inner.residual, by_ends, by_block)
 
-    def between(self, x0: Array, x1: Array, fraction: Array) -> Array:
+    def between(self, x0: Array, x1: Array, fraction: Array, calibration: Calibration) -> Array:
         """What the factor of the sensor takes as its state, shape (m, d)."""
         return interpolate(self.layout, x0, x1, fraction, self.h)
 
-    def motion(self, x0: Array, x1: Array, fraction: Array) -> Array:
+    def motion(self, x0: Array, x1: Array, fraction: Array, calibration: Calibration) -> Array:
         """Time derivative of `between`."""
         return rate_between(self.layout, x0, x1, fraction, self.h)
+
+    def behind(self, J: Array, fraction: Array, calibration: Calibration) -> dict[str, Array]:
+        """Derivatives by parameters that what stands behind the state depends on, by full name, shape (m, r) each."""
+        return {}
 
     def by_ends(self, J: Array, fraction: Array) -> tuple[Array, Array]:
         """Derivatives by both ends of something with derivative J by the state between them, shape (m, r, d)."""

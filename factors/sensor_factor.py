@@ -10,11 +10,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from jointscope.factors.factor import Samples
+from jointscope.robots.parts.motor_current import MotorCurrent
 from jointscope.robots.parts.position_target import PositionTarget
 from jointscope.robots.parts.sensors import Accelerometer, Gyro, LinkEncoder, MotorEncoder, TorqueSensor
 
 Array = NDArray[np.float64]
-AnySensor = TypeVar("AnySensor", Accelerometer, Gyro, LinkEncoder, MotorEncoder, PositionTarget, TorqueSensor)
+AnySensor = TypeVar(
+    "AnySensor", Accelerometer, Gyro, LinkEncoder, MotorCurrent, MotorEncoder, PositionTarget, TorqueSensor
+)
 
 
 @dataclass(frozen=True)

@@ -18,6 +18,7 @@ UNITS: dict[str, tuple[str, float]] = {
     "duty": ("1", 1.0),
     "V": ("V", 1.0),
     "A": ("A", 1.0),
+    "mA": ("A", 1e-3),
     "N m": ("N m", 1.0),
     "m/s^2": ("m/s^2", 1.0),
     "g": ("m/s^2", 9.80665),
@@ -38,6 +39,7 @@ OF_SLIDES: dict[str, str] = {
     "N m/rad^3": "N/m^3",
     "N m s/rad": "N s/m",
     "N m s^2/rad^2": "N s^2/m^2",
+    "A s/rad": "A s/m",
     "kg m2": "kg",
     "s/rad": "s/m",
 }

@@ -21,11 +21,10 @@ from jointscope.factors.calibration import Calibration
 from jointscope.graphs.comparison.causal_filter import filter_around
 from jointscope.graphs.noise.lasting_noise import separate_noise, without_lasting
 from jointscope.graphs.problem.bag_problem import BagProblem, first_command_time
-from jointscope.graphs.problem.sensor_placement import factor_on_state
+from jointscope.graphs.problem.sensor_placement import ACCELERATION, COMMAND, factor_on_state, feels
 from jointscope.graphs.problem.standstill import leaving_standstill_out
 from jointscope.robots.errors import SolveError
 from jointscope.robots.parts.process_noise import ProcessNoise
-from jointscope.robots.parts.sensors import Accelerometer
 
 Array = NDArray[np.float64]
 
@@ -133,13 +132,16 @@ def _channel_variances(
     """Expected squared error of every channel in sigmas, shape (s, c)."""
     robot, x, d = problem.robot, x[ticks], x.shape[1]
     with_a, a_by_state = _with_accelerations(problem, x, calibration, ticks) if robot.accelerometers else (x, x)
+    with_u = np.hstack([x, np.zeros((len(x), robot.n))])  # currents are linear: their slopes ask for no command
     found = []
     for name, sensor in robot.sensors.items():
         factor = factor_on_state(robot, name, np.zeros((len(x), len(sensor.channels))), np.zeros(len(x)))
-        feels = isinstance(sensor, Accelerometer)
-        J = factor.linearize((with_a if feels else x,), calibration).by_state[0] / sensor.sigmas[:, None]
-        if feels:
+        behind = feels(sensor)
+        at = {ACCELERATION: with_a, COMMAND: with_u}.get(behind, x)
+        J = factor.linearize((at,), calibration).by_state[0] / sensor.sigmas[:, None]
+        if behind == ACCELERATION:
             J = J[:, :, :d] + J[:, :, d:] @ a_by_state
+        J = J[:, :, :d]
         found.append(np.einsum("kri,kij,krj->kr", J, P, J, optimize=True) + 1.0)
     return np.hstack(found)
 

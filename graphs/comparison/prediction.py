@@ -44,7 +44,7 @@ class Predictor:
         self._euler = robot.choices.integrator == "euler"
         path = CommandPath(timeline.ticks, timeline.u, robot.effects, robot.joints, not robot.command_held)
         self._h, u = timeline.h, path.acting(robot.values)[0]
-        self._torque = self._model.torque_of(u)
+        self._u, self._torque = u, self._model.torque_of(u)
         self._cuts = StepCuts(robot, h)
         self._edges, self._plays = DeadZoneEdges.of(robot), EncoderPlays.of(robot)
         self._play_sizes = np.zeros(0) if self._plays is None else self._plays.sizes(robot.values)
@@ -98,6 +98,10 @@ class Predictor:
         with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
             rates = self._model.rates(x, self._torque[step])
         return np.hstack([x, rates[:, self._model.layout.v_link]])
+
+    def with_commands(self, x: Array, step: NDArray[np.intp]) -> Array:
+        """States with the acting command behind them, shape (s, d + n); arguments as of `with_accelerations`."""
+        return np.hstack([x, self._u[step]])
 
     def paths(self, x: Array, start: NDArray[np.intp], steps: int) -> Iterator[tuple[NDArray[np.intp], Array, Array]]:
         """Steps, states before and after each of them, until `steps` are done or the recording ends.

@@ -18,11 +18,10 @@ from jointscope.graphs.comparison.causal_filter import FilteredStates
 from jointscope.graphs.comparison.noise_floor import are_judged, settled_from
 from jointscope.graphs.comparison.prediction import Predictor
 from jointscope.graphs.problem.bag_problem import BagProblem
-from jointscope.graphs.problem.sensor_placement import factor_on_state
+from jointscope.graphs.problem.sensor_placement import ACCELERATION, COMMAND, factor_on_state, feels
 from jointscope.graphs.problem.timeline import Timeline
 from jointscope.robots.model.lateness import Lateness, late_channels
 from jointscope.robots.model.robot import Robot
-from jointscope.robots.parts.sensors import Accelerometer
 
 Array = NDArray[np.float64]
 
@@ -54,28 +53,34 @@ class _Group:
         sensor: name.
         channels: indices of the channels.
         taken: when the samples were really taken, shape (m,) [s].
-        accelerated: whether it feels the accelerations of the links, too.
+        behind: what it feels beside the state: accelerations of the links, the acting command, or nothing.
         variance: over time, of the weights of the filter that smoothed them [s^2].
     """
 
     sensor: str
     channels: NDArray[np.intp]
     taken: Array
-    accelerated: bool
+    behind: str
     variance: float
 
     def steps(self, timeline: Timeline, times: Array) -> NDArray[np.intp]:
         """Steps in which samples at these times were taken."""
-        return (timeline.locate_ending(times) if self.accelerated else timeline.locate(times))[0]
+        return (timeline.locate_ending(times) if self.behind else timeline.locate(times))[0]
 
     def at(
         self, problem: BagProblem, predictor: Predictor, step: NDArray[np.intp], times: Array, ends: tuple[Array, Array]
     ) -> Array:
-        """What its factor asks for: states between two ticks, with accelerations behind them where it feels them."""
+        """What its factor asks for: states between two ticks, with what it feels behind them."""
         x = _between(problem, step, times, *ends)
         if self.variance:
             smoothed(problem.robot.layout, x, *ends, problem.timeline.h[step], self.variance)
-        return predictor.with_accelerations(x, step) if self.accelerated else x
+        if not self.behind:
+            return x
+        return (predictor.with_accelerations if self.behind == ACCELERATION else predictor.with_commands)(x, step)
+
+    def size_behind(self, robot: Robot) -> int:
+        """Number of columns behind the state."""
+        return {ACCELERATION: robot.layout.n_link, COMMAND: robot.n}.get(self.behind, 0)
 
 
 def predict_ahead(
@@ -105,7 +110,7 @@ def predict_ahead(
     taken = [g.taken[wanted[g.sensor][0]] for g in groups]
     steps = [g.steps(timeline, times) for g, times in zip(groups, taken, strict=True)]
     d = causal.mean.shape[1]
-    found = [np.full((len(start), d + g.accelerated * problem.robot.layout.n_link), np.nan) for g in groups]
+    found = [np.full((len(start), d + g.size_behind(problem.robot)), np.nan) for g in groups]
     for step, before, after in predictor.paths(causal.mean[start], start, longest):
         for group, states, times, ends in zip(groups, found, taken, steps, strict=True):
             here = ends == step
@@ -137,7 +142,7 @@ def _groups(problem: BagProblem) -> list[_Group]:
             lateness = Lateness.of(problem.robot, late, stamps)
             variance = lateness.variance(problem.robot.values)[0]
             taken = stamps - lateness.anchor
-            found.append(_Group(name, channels, taken, isinstance(sensor, Accelerometer), variance))
+            found.append(_Group(name, channels, taken, feels(sensor), variance))
     return found
 
 
@@ -168,7 +173,8 @@ def _between(problem: BagProblem, step: NDArray[np.intp], times: Array, before: 
 def predict_sensor(robot: Robot, name: str, x: Array, calibration: Calibration, stamps: Array) -> Array:
     """What a sensor would read at these states with these stamps, shape (s,) [s]; shape (s, c).
 
-    States have shape (s, d); for an accelerometer with link accelerations behind them, (s, d + n_link).
+    States have shape (s, d); for an accelerometer with link accelerations behind them, (s, d + n_link), for currents
+    with acting commands, (s, d + n).
     """
     nothing = np.zeros((len(x), len(robot.sensors[name].channels)))
     return factor_on_state(robot, name, nothing, stamps).residual((x,), calibration)

@@ -107,7 +107,7 @@ class BagProblem:
         )
         placed = [Placed(initial, np.zeros(1, np.intp), timeline.ticks[:1])]
         for name in robot.sensors:
-            placed += place_sensor(robot, recording, timeline, name)
+            placed += place_sensor(robot, recording, timeline, name, path)
         placed += [_without_states(BiasPrior(sensor), 1) for sensor in robot.accelerometers]
         for gyro in robot.gyros:
             placed.append(_without_states(BiasPrior(gyro), 1))

@@ -14,11 +14,13 @@ from numpy.typing import NDArray
 from jointscope.factors.accelerated import AcceleratedFactor
 from jointscope.factors.accelerometer import AccelerometerFactor
 from jointscope.factors.distorted import DistortedFactor
+from jointscope.factors.driven import DrivenFactor
 from jointscope.factors.factor import Factor
 from jointscope.factors.gyro import GyroFactor
 from jointscope.factors.interpolated import InterpolatedFactor
 from jointscope.factors.joint_torque import JointTorqueFactor
 from jointscope.factors.link_encoder import LinkEncoderFactor
+from jointscope.factors.motor_current import MotorCurrentFactor
 from jointscope.factors.motor_encoder import MotorEncoderFactor
 from jointscope.factors.position_target import PositionTargetFactor
 from jointscope.factors.relative_gyro import RelativeGyroFactor
@@ -27,12 +29,15 @@ from jointscope.factors.some_channels import SomeChannels
 from jointscope.factors.vertical_gyro import VerticalGyroFactor
 from jointscope.graphs.problem.coarse_encoder import shared_error
 from jointscope.graphs.problem.timeline import Timeline
+from jointscope.robots.dynamics.command_path import CommandPath
 from jointscope.robots.dynamics.spring_torques import SpringTorques
 from jointscope.robots.effect_kinds.effect import LINK_SIDE
 from jointscope.robots.effect_kinds.reading_effect import ReadingEffect
 from jointscope.robots.model.encoder_plays import EncoderPlays
 from jointscope.robots.model.lateness import Lateness, late_channels
+from jointscope.robots.model.motor_currents import MotorCurrents
 from jointscope.robots.model.robot import Robot
+from jointscope.robots.parts.motor_current import MotorCurrent
 from jointscope.robots.parts.position_target import PositionTarget
 from jointscope.robots.parts.sensors import Accelerometer, Gyro, LinkEncoder, MotorEncoder, Sensor, TorqueSensor
 from jointscope.robots.recordings.recording import Recording, Stream
@@ -41,6 +46,7 @@ Array = NDArray[np.float64]
 Flags = NDArray[np.bool_]
 Channels = NDArray[np.intp]
 
+ACCELERATION, COMMAND = "acceleration", "command"
 ALIGNED = 1.0 / 3.0  # [sigma] a sample may be taken at a tick if the signal moves less than this in between
 
 
@@ -59,7 +65,7 @@ class Placed:
     times: Array
 
 
-def place_sensor(robot: Robot, recording: Recording, timeline: Timeline, name: str) -> list[Placed]:
+def place_sensor(robot: Robot, recording: Recording, timeline: Timeline, name: str, path: CommandPath) -> list[Placed]:
     """The samples of one sensor: those at a tick, those between two, and channels whose stamps are late apart.
 
     Args:
@@ -67,24 +73,35 @@ def place_sensor(robot: Robot, recording: Recording, timeline: Timeline, name: s
         recording: the data.
         timeline: ticks of the states.
         name: name of the sensor.
+        path: how the commands act.
     """
-    placed = []
+    placed, behind = [], feels(robot.sensors[name])
     for channels, late in late_channels(robot, name):
-        if not late:
+        if not late and not behind:
             placed += _place_on_time(robot, recording, timeline, name, channels)
             continue
         stream = recording.streams[name]
         lateness = Lateness.of(robot, late, stream.times)
         taken = stream.times - lateness.anchor
-        kind = AcceleratedFactor if isinstance(robot.sensors[name], Accelerometer) else InterpolatedFactor
         for rows, some in _as_measured(robot, recording, stream, name, channels):
             inside = rows & (taken >= timeline.ticks[0]) & (taken <= timeline.ticks[-1])
-            step, fraction = timeline.locate(taken[inside])
+            if behind == COMMAND:  # of a command before the first nothing is known
+                inside &= taken > timeline.ticks[0]
+            step, fraction = (timeline.locate_ending if behind else timeline.locate)(taken[inside])
             inner = _some(_sensor_factor(robot, recording, name, stream, inside), some, robot.sensors[name])
-            here = replace(lateness, stamps=lateness.stamps[inside], anchor=lateness.anchor[inside])
-            factor = kind(inner, fraction, timeline.h[step], robot.layout, here, robot.values)
+            here = replace(lateness, stamps=lateness.stamps[inside], anchor=lateness.anchor[inside]) if late else None
+            between = inner, fraction, timeline.h[step], robot.layout, here, robot.values
+            if behind == COMMAND:
+                factor: Factor = DrivenFactor(*between, path=path, step=step)
+            else:
+                factor = (AcceleratedFactor if behind else InterpolatedFactor)(*between)
             placed.append(Placed(factor, step, stream.times[inside]))
     return placed
+
+
+def feels(sensor: Sensor) -> str:
+    """What its reading needs behind the state: ACCELERATION, COMMAND, or nothing."""
+    return ACCELERATION if isinstance(sensor, Accelerometer) else COMMAND if isinstance(sensor, MotorCurrent) else ""
 
 
 def _as_measured(
@@ -113,8 +130,6 @@ def _place_on_time(
     sensor = robot.sensors[name]
     stream = recording.streams[name].between(timeline.ticks[0], np.nextafter(timeline.ticks[-1], np.inf))
     parts = _as_measured(robot, recording, stream, name, channels)
-    if isinstance(sensor, Accelerometer):
-        return [_place_accelerometer(robot, recording, timeline, stream, rows, some) for rows, some in parts]
     step, fraction = timeline.locate(stream.times)
     h = timeline.h[step]
     nearest = step + (fraction > 0.5)
@@ -131,16 +146,6 @@ def _place_on_time(
             factor = InterpolatedFactor(inner, fraction[between], h[between], robot.layout)
             placed.append(Placed(factor, step[between], stream.times[between]))
     return placed
-
-
-def _place_accelerometer(
-    robot: Robot, recording: Recording, timeline: Timeline, stream: Stream, rows: Flags, channels: Channels
-) -> Placed:
-    times = stream.times[rows]
-    step, fraction = timeline.locate_ending(times)
-    sensor = robot.sensors[stream.name]
-    inner = _some(_sensor_factor(robot, recording, stream.name, stream, rows), channels, sensor)
-    return Placed(AcceleratedFactor(inner, fraction, timeline.h[step], robot.layout), step, times)
 
 
 def _some(factor: Factor, channels: Channels, sensor: Sensor) -> Factor:
@@ -174,7 +179,8 @@ def _sensor_factor(robot: Robot, recording: Recording, name: str, stream: Stream
 def factor_on_state(robot: Robot, name: str, values: Array, times: Array) -> Factor:
     """A sensor with all its channels predicted from the state, whatever form its file chooses.
 
-    An accelerometer is predicted from the state with the accelerations of the links behind it.
+    An accelerometer is predicted from the state with the accelerations of the links behind it, a current from one with
+    the acting command.
 
     Args:
         robot: the model.
@@ -192,6 +198,8 @@ def factor_on_state(robot: Robot, name: str, values: Array, times: Array) -> Fac
         return PositionTargetFactor(sensor, values, robot.kinematic_tree, robot.layout, robot.values)
     if isinstance(sensor, TorqueSensor):
         return JointTorqueFactor(sensor, values, SpringTorques(robot))
+    if isinstance(sensor, MotorCurrent):
+        return MotorCurrentFactor(sensor, values, MotorCurrents(robot, sensor), robot.layout)
     if isinstance(sensor, MotorEncoder):
         inner = MotorEncoderFactor(sensor, values, robot.layout, _lags(robot, name))
         seats = {joint: np.array([j]) for j, joint in enumerate(robot.joints)}

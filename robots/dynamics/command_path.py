@@ -36,6 +36,11 @@ class CommandPath:
         self._cache: tuple[tuple[float, ...], tuple[Array, dict[str, Array]]] | None = None
 
     @property
+    def n(self) -> int:
+        """Number of joints."""
+        return len(self._joints)
+
+    @property
     def changes(self) -> bool:
         """Whether any effect changes the commands."""
         return bool(self._effects)

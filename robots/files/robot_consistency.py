@@ -12,6 +12,7 @@ from jointscope.robots.geometry.arm_effects import effect_units
 from jointscope.robots.geometry.error_parameters import pose_units
 from jointscope.robots.model.command_words import edited_argument, robot_argument
 from jointscope.robots.model.robot import SHARPNESS, Robot
+from jointscope.robots.parts.motor_current import MotorCurrent
 from jointscope.robots.parts.sensors import BY_MESSAGE, LinkEncoder, MotorEncoder, TorqueSensor
 from jointscope.robots.yaml_section import did_you_mean
 
@@ -43,6 +44,7 @@ def check_robot(robot: Robot) -> None:
     for name in (name for target in robot.targets for name in target.own if name in robot.parameters):
         if robot.parameters[name].positive:
             raise RobotError(f"{place}: parameters.{name}.positive: expected false, a place has any sign")
+    _check_currents(robot, place)
     _check_names(robot, place)
     _check_stamps(robot, place)
     _check_positions(robot, place)
@@ -83,6 +85,33 @@ def _check_accelerometers(robot: Robot, place: str) -> None:
                 )
             if robot.parameters[name].positive:
                 raise RobotError(f"{place}: parameters.{name}.positive: expected false, a place has any sign")
+
+
+def _check_currents(robot: Robot, place: str) -> None:
+    """What turns torques into currents is known, and every constant has the sign that it can have."""
+    sensor = robot.motor_current
+    if sensor is None:
+        return
+    where = f"{place}: sensors.{sensor.name}"
+    if robot.free_links:
+        raise RobotError(f"{where}: currents need link_dynamics: model; remove the sensor, or give masses")
+    if robot.command.source_is(sensor.source):
+        raise RobotError(f"{where}: the same field as the command; a signal is a command or a measurement, not both")
+    for joint in robot.joints:
+        constant, back_emf, offset = sensor.of_joint(joint)
+        if constant not in robot.parameters and robot.drive_gain != "torque_constant":
+            unit = robot.unit_at(joint, "N m/A")
+            raise RobotError(
+                f"{place}: parameters: '{constant}' is missing, the torque of one ampere behind the gear; write "
+                f"{constant}: {{value: 1.0, unit: {unit}, prior_sigma: 1.0}} with the data sheet's value, gear ratio "
+                "times k_t"
+            )
+        if back_emf in robot.parameters and "k_mi" not in robot.drive_laws:
+            raise RobotError(f"{place}: parameters: {back_emf} belongs to drives that take volts; remove it")
+        for name, positive in ((constant, True), (back_emf, True), (offset, False)):
+            if name in robot.parameters and robot.parameters[name].positive != positive:
+                reason = "an offset has any sign" if name == offset else "a constant below zero is a sign: use `scale`"
+                raise RobotError(f"{place}: parameters.{name}.positive: expected {str(positive).lower()}, {reason}")
 
 
 def _check_links(robot: Robot, place: str) -> None:
@@ -156,7 +185,7 @@ def _check_names(robot: Robot, place: str) -> None:
         if name in taken:
             raise RobotError(f"{place}: sensors.{name}: the name {name!r} is taken; give the sensor another one")
     encoders = [name for name, sensor in robot.sensors.items() if isinstance(sensor, MotorEncoder)]
-    for kind in (LinkEncoder, TorqueSensor):
+    for kind in (LinkEncoder, MotorCurrent, TorqueSensor):
         same = [name for name, sensor in robot.sensors.items() if isinstance(sensor, kind)]
         if len(same) > 1:
             raise RobotError(f"{place}: sensors: expected at most one of each kind but gyro, got {', '.join(same)}")
@@ -211,6 +240,10 @@ def _check_parameters(robot: Robot, place: str) -> None:
         units |= {
             name: unit for pair in robot.torque_sensor.parameters for name, unit in zip(pair, ("1", "N m"), strict=True)
         }
+    if robot.motor_current is not None:
+        for joint in robot.joints:
+            known = robot.motor_current.parameter_units(joint).items()
+            units |= {name: robot.unit_at(joint, unit) for name, unit in known}
     of_poses = {}
     if robot.poses is not None:
         of_poses = effect_units(robot.joints) | pose_units(robot.joints, robot.poses.other_names)

@@ -5,6 +5,7 @@
     gyro     R_imu_body omega_body(q_link, v_link) + errors of effects, to which a bias is added
     accelerometer  R_imu_body f_body(q_link, v_link, a_link), to which a bias is added
     torque   scale times that of the springs, and offset
+    current  g u / k_i - k_e v_motor + offset
     target   R_tracker_base (p_base(q_link) - place)
 
 A test holds it against the factors.
@@ -22,6 +23,7 @@ from numpy.typing import NDArray
 from jointscope.robots.effect_kinds.effect import LINK_SIDE
 from jointscope.robots.effect_kinds.reading_effect import ReadingEffect
 from jointscope.robots.model.encoder_plays import EncoderPlays
+from jointscope.robots.model.motor_currents import MotorCurrents
 from jointscope.robots.model.robot import Robot
 from jointscope.robots.parts.sensors import Accelerometer, Gyro, LinkEncoder, MotorEncoder, Sensor
 
@@ -40,6 +42,7 @@ class ReadingsAtOneState:
     def __init__(self, robot: Robot, torques: Callable[[Array], tuple[Array, Array]] | None = None):
         self._torques = {} if robot.torque_sensor is None or torques is None else {robot.torque_sensor.name: torques}
         self._layout, tree = robot.layout, robot.kinematic_tree
+        self._currents = _currents_of(robot)
         self._model, self._data = tree.model, tree.model.createData()
         self._zeros, self._coupling = np.zeros(tree.model.nv), tree.coupling
         self._gyros = {gyro.name: (tree.frame_id(gyro.body), gyro.R_imu_body) for gyro in robot.gyros}
@@ -64,12 +67,17 @@ class ReadingsAtOneState:
         """Whether a sensor's reading needs the accelerations of the links behind the state."""
         return name in self._accelerometers
 
+    def feels_command(self, name: str) -> bool:
+        """Whether a sensor's reading needs the acting command behind the state."""
+        return name in self._currents
+
     def read(self, name: str, x: Array, time: float) -> tuple[Array, Array]:
         """Reading of a sensor without its bias, and its derivative by the state.
 
         Args:
             name: of the sensor.
-            x: state, shape (d,); for an accelerometer with the link accelerations behind it, (d + n_link,).
+            x: state, shape (d,); for an accelerometer with the link accelerations behind it, (d + n_link,), for
+                currents with the acting command, (d + n,).
             time: stamp of the sample [s].
 
         Returns:
@@ -81,6 +89,9 @@ class ReadingsAtOneState:
             return self._place(*self._targets[name], x)
         if name in self._torques:
             return self._torques[name](x)
+        if name in self._currents:
+            J, by_u, at_rest = self._currents[name]
+            return J @ x[: self._layout.size] + by_u * x[self._layout.size :] + at_rest, J
         if name in self._gyros:
             reading, J = self._rate(name, x)
             offset: Array | float = 0.0
@@ -163,6 +174,18 @@ class _Seat:
         gyro = next(gyro for gyro in robot.gyros if gyro.name == sensor.gyro)
         place = sensor.place(robot.parameters), gyro.R_imu_body
         return _Seat(robot.kinematic_tree.frame_id(gyro.body), *place, robot.gravity_at(sensor))
+
+
+def _currents_of(robot: Robot) -> dict[str, tuple[Array, Array, Array]]:
+    """Of the sensor of currents its derivative by the state, (n, d), by the command of each motor, (n,), and offset."""
+    sensor = robot.motor_current
+    if sensor is None:
+        return {}
+    law, values, nothing = MotorCurrents(robot, sensor), robot.values, np.zeros((1, robot.n))
+    by_u, by_v = law.slopes(values)
+    J = np.zeros((robot.n, robot.layout.size))
+    J[np.arange(robot.n), robot.layout.motor_v] = by_v
+    return {sensor.name: (J, by_u, law.value(nothing, nothing, values)[0])}
 
 
 def _errors_of(

@@ -24,6 +24,7 @@ from jointscope.robots.model.structured_tree import bearing_names, with_bearings
 from jointscope.robots.parts.derived import Derived
 from jointscope.robots.parts.frequency_setup import FrequencySetup
 from jointscope.robots.parts.model_choices import ModelChoices
+from jointscope.robots.parts.motor_current import MotorCurrent
 from jointscope.robots.parts.parameter import Parameter
 from jointscope.robots.parts.pose_setup import PoseSetup
 from jointscope.robots.parts.position_controller import PositionController
@@ -34,7 +35,6 @@ from jointscope.robots.parts.state_layout import StateLayout
 from jointscope.robots.units import joined, of_slide
 
 SHARPNESS = "friction_sharpness"  # of a joint whose dry friction turns over as its own parameter says
-
 Array = NDArray[np.float64]
 
 
@@ -112,6 +112,11 @@ class Robot:
         return next((sensor for sensor in self.sensors.values() if isinstance(sensor, TorqueSensor)), None)
 
     @property
+    def motor_current(self) -> MotorCurrent | None:
+        """The measured currents of the motors, where there are any."""
+        return next((sensor for sensor in self.sensors.values() if isinstance(sensor, MotorCurrent)), None)
+
+    @property
     def free_links(self) -> bool:
         """Whether the links' masses are not known, so that there are no equations of motion."""
         return self.choices.link_dynamics == "free"
@@ -154,7 +159,7 @@ class Robot:
         """The sensors whose offset is another one in each recording: gyros first."""
         return (*self.gyros, *self.accelerometers)
 
-    def without(self, sensors: Sequence[Accelerometer | TorqueSensor]) -> Robot:
+    def without(self, sensors: Sequence[Accelerometer | MotorCurrent | TorqueSensor]) -> Robot:
         """The robot for what does not ask some sensors; their own parameters stay as they are."""
         if not sensors:
             return self
@@ -189,8 +194,7 @@ class Robot:
         return tree.with_coriolis(True) if self._owners_of("coriolis") else tree
 
     def _owners_of(self, form: str) -> tuple[str, ...]:
-        structures = ((here.owner, here.effect) for here in self.effects)
-        return tuple(owner for owner, effect in structures if isinstance(effect, Structure) and effect.form == form)
+        return tuple(h.owner for h in self.effects if isinstance(h.effect, Structure) and h.effect.form == form)
 
     def free_inertias(self) -> NDArray[np.float64]:
         """Inertia of each link coordinate while others are free, or its rotor's alone, shape (n_link,) [kg m^2]."""
@@ -243,9 +247,8 @@ class Robot:
 
         One that comes with the positions, in the same message, was measured, unless the robot file says otherwise.
         """
-        if self.command.held is not None:
-            return self.command.held
-        return self.command.topic not in (sensor.source.topic for sensor in self.sensors.values())
+        held, topics = self.command.held, (sensor.source.topic for sensor in self.sensors.values())
+        return self.command.topic not in topics if held is None else held
 
     @property
     def drive_gain(self) -> str | None:
@@ -266,8 +269,7 @@ class Robot:
     @property
     def drive_laws(self) -> tuple[str, ...]:
         """The gain, where there is one, and the back-EMF of a motor that is driven by a voltage."""
-        gain = self.drive_gain
-        return () if gain is None else (gain, "k_mi") if gain == "k_pwm" else (gain,)
+        return {None: (), "k_pwm": ("k_pwm", "k_mi")}.get(self.drive_gain, (str(self.drive_gain),))
 
     def drive_parameter(self, joint: str, name: str) -> Parameter:
         """A parameter of a joint's drive: the joint's own if it has one, else the one all motors share."""
@@ -291,8 +293,7 @@ class Robot:
     def locked_as_in(self, positions: Mapping[str, float]) -> Robot:
         """The same robot whose file locks joints it does not name yet as in a recording."""
         filed = self.as_filed or self.tree
-        locked = filed.posture(positions) | filed.locked
-        return replace(self, tree=filed.locked_at(locked), as_filed=None)
+        return replace(self, tree=filed.locked_at(filed.posture(positions) | filed.locked), as_filed=None)
 
     def with_sensors(self, sensors: Mapping[str, Sensor]) -> Robot:
         """The same robot with some sensors replaced."""

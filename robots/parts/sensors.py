@@ -10,6 +10,7 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
+from jointscope.robots.parts.motor_current import MotorCurrent
 from jointscope.robots.parts.parameter import Parameter
 from jointscope.robots.parts.position_target import PositionTarget
 from jointscope.robots.units import si_factor, si_unit
@@ -50,6 +51,10 @@ class Topic:
     stamped_by: tuple[str, ...] = ()
     held: bool | None = None
     confirmed: bool = False
+
+    def source_is(self, other: Topic) -> bool:
+        """Whether another stream is the same field of the same messages."""
+        return (self.topic, self.field) == (other.topic, other.field)
 
     @property
     def factor(self) -> NDArray[np.float64]:
@@ -272,4 +277,4 @@ class Accelerometer:
         return np.array([parameters[name].value for name in self.lever])
 
 
-Sensor = MotorEncoder | LinkEncoder | TorqueSensor | Gyro | Accelerometer | PositionTarget
+Sensor = MotorEncoder | LinkEncoder | TorqueSensor | MotorCurrent | Gyro | Accelerometer | PositionTarget

@@ -23,6 +23,7 @@ from jointscope.tools.simulator.loop.motion import MIN_REST, start_position
 from jointscope.tools.simulator.loop.online_encoder import OnlineEncoder
 from jointscope.tools.simulator.loop.sampled_sensor import (
     SampledAccelerometer,
+    SampledCurrent,
     SampledEncoder,
     SampledGyro,
     SampledSensor,
@@ -144,6 +145,10 @@ class Occasion:
         if torque is not None:
             times = stamps(torque.name, sampling.encoder_rate)
             found[torque.name] = SampledTorque(torque, self.engine, sampling, times, seed, self.truth)
+        current = self._robot.motor_current
+        if current is not None:
+            times = stamps(current.name, sampling.encoder_rate)
+            found[current.name] = SampledCurrent(current, self.engine, sampling, times, seed, self.truth)
         for target in self._robot.targets:
             times = stamps(target.name, sampling.target_rate)
             found[target.name] = SampledTarget(target, self.engine, sampling, times, seed, self.truth)

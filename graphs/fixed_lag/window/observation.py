@@ -77,8 +77,8 @@ def observed_rows(
     observations: Sequence[Observation],
     x0: Array | None,
     x1: Array,
-    t0: float,
-    t1: float,
+    times: tuple[float, float],
+    u: Array,
 ) -> ObservedRows:
     """Linearises samples that were taken in a step.
 
@@ -89,9 +89,10 @@ def observed_rows(
         x0: state at the beginning, shape (D,); None where all samples were taken at the end, and none of them is an
             acceleration or smoothed.
         x1: state at the end, shape (D,).
-        t0: beginning of the step [s].
-        t1: end of the step [s].
+        times: of beginning and end of the step [s].
+        u: mean command of the step, shape (n,).
     """
+    t0, t1 = times
     d, total = layout.d, sum(len(o.values) for o in observations)
     residual, sigma = np.empty(total), np.empty(total)
     by_end = np.zeros((total, layout.size))
@@ -103,7 +104,8 @@ def observed_rows(
         parts.append(part)
         sigma[part] = o.sigma
         if x0 is None or (o.taken >= t1 - AT_TICK and not o.needs_step(readings)):
-            reading, J = readings.read(o.sensor, own, o.stamp)
+            at = np.concatenate([own, u]) if readings.feels_command(o.sensor) else own
+            reading, J = readings.read(o.sensor, at, o.stamp)
             by_end[part, :d] = J if len(J) == len(o.channels) else J[o.channels]
         else:
             h, s = t1 - t0, (o.taken - t0) / (t1 - t0)
@@ -112,6 +114,8 @@ def observed_rows(
                 smoothed(layout.robot, at[None], x0[None, :d], x1[None, :d], np.array([h]), o.variance)
             if readings.feels_acceleration(o.sensor):
                 at = np.concatenate([at, _acceleration(layout, x0, x1, s, h)])
+            elif readings.feels_command(o.sensor):
+                at = np.concatenate([at, u])
             reading, J = readings.read(o.sensor, at, o.stamp)
             if by_start is None:
                 by_start = np.zeros((total, layout.size))

@@ -25,6 +25,7 @@ class PastTick:
         observations: samples of the step that led here, those taken for glitches included.
         nominal: state from which deviations count, shape (D,).
         filtered: the state here when it was the newest.
+        u: mean command of the step that led here, shape (n,).
         slots: of the factors of the step that led here.
         glitches: sensor of each sample of it that was taken for a glitch.
         far: channels that had been far away when the tick was closed.
@@ -35,6 +36,7 @@ class PastTick:
     observations: tuple[Observation, ...]
     nominal: Array
     filtered: NewestState
+    u: Array
     slots: list[int] = field(default_factory=list)
     glitches: tuple[str, ...] = ()
     far: Far = field(default_factory=dict)

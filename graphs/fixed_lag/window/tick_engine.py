@@ -94,7 +94,7 @@ class TickEngine:
         self._waiting = 0
         self._process.begins_near(None)
         self._judge.go_back_to({})
-        self.past.append(PastTick(0, time, (), state.mean.copy(), state))
+        self.past.append(PastTick(0, time, (), state.mean.copy(), state, np.zeros(len(self.torque_gain))))
         self.window.add_tick(0, time)
         root = np.linalg.inv(np.linalg.cholesky(state.covariance / np.outer(self._scale, self._scale))) / self._scale
         self.window.add_rows(Rows((0,), (root,), np.zeros(len(root))))
@@ -113,7 +113,7 @@ class TickEngine:
         """
         before, x0 = self.past[-1], self.newest
         found = self._process.predicted(x0, time - before.time, u, doubt)
-        here = PastTick(before.number + 1, time, tuple(observations), found.state.mean.copy(), found.state)
+        here = PastTick(before.number + 1, time, tuple(observations), found.state.mean.copy(), found.state, u)
         self.window.add_tick(here.number, time)
         innovations = self._step(before, here, x0, found)
         self.past.append(here)
@@ -139,7 +139,7 @@ class TickEngine:
             at_tick = abs(last.time - o.taken) <= AT_TICK and not feels
             x1 = self._estimate(last)
             x0 = None if at_tick or first is last else self._estimate(first)
-            seen = observed_rows(self._readings, self.layout, [o], x0, x1, first.time, last.time)
+            seen = observed_rows(self._readings, self.layout, [o], x0, x1, (first.time, last.time), last.u)
             H = seen.by_end if seen.by_start is None else seen.by_end + seen.by_start
             S = H @ self.window.covariance(last.number) @ H.T
             S.flat[:: len(S) + 1] += seen.sigma**2
@@ -188,7 +188,8 @@ class TickEngine:
                 self.window.remove(slot)
             tick.slots.clear()
             x0, h = self.newest, tick.time - start.time
-            self._step(start, tick, x0, self._process.predicted(x0, h, *acting(start.time, tick.time)))
+            tick.u, doubt = acting(start.time, tick.time)
+            self._step(start, tick, x0, self._process.predicted(x0, h, tick.u, doubt))
             change.update(tick.glitches)
         self._reread()
         return change
@@ -231,7 +232,7 @@ class TickEngine:
         x1, time, observations = found.state, here.time, here.observations
         at_end = all(o.taken >= time - AT_TICK and not o.needs_step(self._readings) for o in observations)
         start = None if at_end else x0.mean
-        seen = observed_rows(self._readings, self.layout, observations, start, x1.mean, before.time, time)
+        seen = observed_rows(self._readings, self.layout, observations, start, x1.mean, (before.time, time), here.u)
         with_state = seen.by_end @ x1.covariance
         S = with_state @ seen.by_end.T
         if seen.by_start is not None:

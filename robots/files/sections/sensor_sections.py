@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from jointscope.robots.errors import RobotError
+from jointscope.robots.parts.motor_current import MotorCurrent
 from jointscope.robots.parts.position_target import PositionTarget
 from jointscope.robots.parts.sensors import (
     BY_MESSAGE,
@@ -28,7 +29,7 @@ from jointscope.robots.yaml_section import Section
 Array = NDArray[np.float64]
 
 GYRO_FORMS = ("full", "vertical", "relative")
-KINDS = ("motor_encoder", "link_encoder", "joint_torque", "gyro", "accelerometer", "position_target")
+KINDS = ("motor_encoder", "link_encoder", "joint_torque", "motor_current", "gyro", "accelerometer", "position_target")
 UNKNOWN = "unknown"
 
 
@@ -102,6 +103,8 @@ def sensor(name: str, joints: tuple[str, ...]) -> Callable[[Section], Sensor]:
             return _accelerometer(name, section)
         if kind == "position_target":
             return _position_target(name, section)
+        if kind == "motor_current":
+            return _motor_current(name, section, joints)
         if kind == "joint_torque":
             return _torque_sensor(name, section, joints)
         return (_motor_encoder if kind == "motor_encoder" else _link_encoder)(name, section, joints)
@@ -115,12 +118,17 @@ def _position(section: Section, joints: tuple[str, ...]) -> tuple[Topic, Array]:
     for unit in source.bag_units(len(joints)):
         if si_unit(unit) not in ("rad", "m"):
             raise RobotError(f"{section.place}.unit: an encoder measures an angle or a length, got {unit!r}")
+    return source, _sigmas(section, joints)
+
+
+def _sigmas(section: Section, joints: tuple[str, ...]) -> Array:
+    """Noise of each joint, shape (n,): one number for all, or a list."""
     if not isinstance(section.raw("sigma"), Sequence):
-        return source, np.full(len(joints), section.number("sigma", positive=True))
+        return np.full(len(joints), section.number("sigma", positive=True))
     sigmas = section.array("sigma", (len(joints),))
     if np.any(sigmas <= 0.0):
         raise RobotError(f"{section.place}.sigma: expected numbers above zero, got {sigmas.tolist()}")
-    return source, sigmas
+    return sigmas
 
 
 def _motor_encoder(name: str, section: Section, joints: tuple[str, ...]) -> MotorEncoder:
@@ -141,6 +149,17 @@ def _torque_sensor(name: str, section: Section, joints: tuple[str, ...]) -> Torq
     if source.unit != "N m":
         raise RobotError(f"{section.place}.unit: expected 'N m', got {source.unit!r}")
     return TorqueSensor(name, source, section.number("sigma", positive=True), joints)
+
+
+def _motor_current(name: str, section: Section, joints: tuple[str, ...]) -> MotorCurrent:
+    source = topic(section, joints, scaled=True)
+    wrong = next((unit for unit in source.bag_units(len(joints)) if si_unit(unit) != "A"), None)
+    if wrong is not None:
+        raise RobotError(
+            f"{section.place}.unit: a current is in A or mA, got {wrong!r}; of a torque that the drive works out from "
+            "its current, write A: what one unit makes is a parameter of its own"
+        )
+    return MotorCurrent(name, source, _sigmas(section, joints), joints)
 
 
 def _vectors(section: Section, unit: str, expected: str) -> Topic:

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from jointscope.robots.model.robot import Robot
+from jointscope.robots.parts.motor_current import MotorCurrent
 from jointscope.robots.parts.position_target import PositionTarget
 from jointscope.robots.parts.sensors import LinkEncoder, MotorEncoder, Sensor, TorqueSensor
 from jointscope.robots.recordings.recording import Stream
@@ -160,6 +161,37 @@ class SampledTorque(SampledSensor):
             mujoco.mj_rne(self._model, data, 1, found)
             torques[k] = found[self._link]
         return self._scale * torques + self._offset + self._sigmas * self._noise[rows]
+
+
+class SampledCurrent(SampledSensor):
+    """The currents of the motors: the engine's actuators, wound to the data sheet of `robot`.
+
+    The torque of an actuator at rest makes a current by its constant. A voltage behind a resistance R is left with
+    u - n k_t v, so that the speed takes n k_t / R away.
+    """
+
+    def __init__(
+        self, sensor: MotorCurrent, engine: Engine, sampling: Sampling, stamps: Array, seed: int, robot: Robot
+    ):
+        super().__init__(sensor, engine, sampling, stamps, seed)
+        self._motor, self._sigmas, known = engine.motor, sensor.sigmas, robot.values
+        gain = engine.drive_gains
+        n_kt = [known.get(sensor.torque_per_ampere(joint), g) for joint, g in zip(robot.joints, gain, strict=True)]
+        self._n_kt, volts = np.array(n_kt), robot.command.unit in ("duty", "V")
+        # n k_t / R of a winding that makes this torque of a unit of the command, itself of so many volts
+        lost = gain / robot.command_volts if volts else np.zeros(robot.n)
+        own = [known.get(sensor.back_emf(joint), float(k)) for joint, k in zip(robot.joints, lost, strict=True)]
+        self._gain, self._lost = gain, np.array(own)
+        self._offset = np.array([known.get(sensor.offset(joint), 0.0) for joint in robot.joints])
+        self._noise = random_stream(seed, "noise", sensor.name).standard_normal((len(stamps), robot.n))
+
+    def given_out(self, trajectory: Trajectory, rows: Rows) -> Array:
+        """Currents, shape (k, n_joints) [A]."""
+        times = self.taken[rows] - self._age[0]
+        v = trajectory.at(times)[1][:, self._motor]
+        amperes = trajectory.command(times) * self._gain / self._n_kt - self._lost * v
+        amperes = distort(self._effects, self.sensor, self.stamps[rows], amperes)
+        return amperes + self._offset + self._sigmas * self._noise[rows]
 
 
 class SampledTarget(SampledSensor):

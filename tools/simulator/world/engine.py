@@ -55,6 +55,8 @@ class Engine:
     Attributes:
         model, data: of MuJoCo.
         address: where the robot's coordinates are.
+        link, motor: indices of the links' and the rotors' coordinates, in the order of the joints; the rotor of a rigid
+            joint is its link.
     """
 
     def __init__(
@@ -84,8 +86,8 @@ class Engine:
         self.data = self._mujoco.MjData(self.model)
         self._seen = self._mujoco.MjData(self.model)  # for looking at other states than the present one
         self.address = self._find_address(robot)
-        self._link = np.array([self.address.link[joint] for joint in robot.joints])
-        self._motor = np.array([self.address.motor[joint] for joint in robot.joints])
+        self.link = np.array([self.address.link[joint] for joint in robot.joints])
+        self.motor = np.array([self.address.motor[joint] for joint in robot.joints])
         self._followers = [(self.model.joint(n).qposadr[0], f) for n, f in robot.tree.followers.items()]
         self._actuator = np.array([self.address.actuator[joint] for joint in robot.joints])
         for effect in self.effects:
@@ -97,14 +99,9 @@ class Engine:
             self._torques.append(self._smooth_friction(robot))
 
     @property
-    def link(self) -> NDArray[np.intp]:
-        """Indices of the link coordinates, in the order of the joints."""
-        return self._link
-
-    @property
-    def motor(self) -> NDArray[np.intp]:
-        """Indices of the rotor coordinates, in the order of the joints; of a rigid one that of its link."""
-        return self._motor
+    def drive_gains(self) -> Array:
+        """Torque that each motor makes of a unit of its command at rest, shape (n_joints,) [N m]."""
+        return np.array(self.model.actuator_gainprm[self._actuator, 0])
 
     @property
     def coordinates(self) -> tuple[str, ...]:
@@ -114,7 +111,7 @@ class Engine:
     def place(self, position: Array) -> None:
         """Puts links at a position, shape (n_joints,) [rad], and rotors where springs are relaxed, at rest."""
         self._mujoco.mj_resetData(self.model, self.data)
-        self.data.qpos[self._link], self.data.qpos[self._motor] = position, np.linalg.solve(self._T, position)
+        self.data.qpos[self.link], self.data.qpos[self.motor] = position, np.linalg.solve(self._T, position)
         for place, follower in self._followers:
             self.data.qpos[place] = follower.position(self.data.joint(follower.leader).qpos[0])
 
@@ -157,12 +154,13 @@ class Engine:
         qpos, qvel, ctrl, applied = data.qpos, data.qvel, data.ctrl, data.qfrc_applied
         ticks, h = len(link_torques), TICK / steps
         q, v = np.empty((ticks * steps + 1, model.nq)), np.empty((ticks * steps + 1, model.nv))
+        acted = np.zeros((len(q), len(self._actuator)))
         q[0], v[0], row = qpos, qvel, 0
         disturbance = self._on_coordinates(link_torques, motor_torques)
         commanding = [effect for effect in self.effects if effect.uses("command")]
         with self._hooked():
             for k in range(ticks):
-                issued = controller(k, Trajectory(h, q[: row + 1], v[: row + 1]))
+                issued = controller(k, Trajectory(h, q[: row + 1], v[: row + 1], acted[: row + 1]))
                 ctrl[self._actuator] = issued
                 applied[:] = disturbance[k]
                 for _ in range(steps):
@@ -170,19 +168,19 @@ class Engine:
                         ctrl[self._actuator] = acting(commanding, row * h, issued)
                     mj_step(model, data)
                     row += 1
-                    q[row], v[row] = qpos, qvel
+                    q[row], v[row], acted[row] = qpos, qvel, ctrl[self._actuator]
                 if k % 1000 == 999:
                     self._check_sane((k + 1) * TICK)
                     progress(k + 1)
         self._check_sane(ticks * TICK)
         progress(ticks)
-        return Trajectory(h, q, v)
+        return Trajectory(h, q, v, acted)
 
     def _on_coordinates(self, link: Array, motor: Array) -> Array:
         """Torques on all coordinates, shape (ticks, nv); both sides of a rigid joint act on one."""
         torques = np.zeros((len(link), self.model.nv))
-        torques[:, self._link] = link
-        torques[:, self._motor] += motor
+        torques[:, self.link] = link
+        torques[:, self.motor] += motor
         return torques
 
     def body_rates(self, site: str, q: Array, v: Array) -> Array:

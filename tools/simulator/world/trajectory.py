@@ -19,11 +19,13 @@ class Trajectory:
         step: of the grid [s].
         q: positions, shape (m, nq) [rad].
         v: velocities, shape (m, nq) [rad/s].
+        u: command that acted in the step before each point, shape (m, n); None where nobody asks for it.
     """
 
     step: float
     q: Array
     v: Array
+    u: Array | None = None
 
     @property
     def end(self) -> float:
@@ -56,6 +58,12 @@ class Trajectory:
         on_grid = place == nearest
         q[on_grid], v[on_grid] = self.q[place[on_grid].astype(int)], self.v[place[on_grid].astype(int)]
         return q, v
+
+    def command(self, times: Array) -> Array:
+        """The command that acted until each time, shape (k, n); of a time before the first step that of the first."""
+        assert self.u is not None
+        place = np.clip(np.ceil(np.asarray(times) / self.step - 1e-6).astype(int), 1, len(self.u) - 1)
+        return self.u[place]
 
     def acceleration(self, times: Array) -> Array:
         """Accelerations of all coordinates, shape (k, nq) [rad/s^2]: differences of velocities, linear in between.
