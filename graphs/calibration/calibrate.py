@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from jointscope.factors.calibration import DYNAMICS, Calibration, rotation_block
 from jointscope.graphs.calibration.calibration_result import CalibrationResult
 from jointscope.graphs.calibration.calibration_summary import summarize
+from jointscope.graphs.calibration.current_delay import solved_with_current_delay
 from jointscope.graphs.calibration.encoder_filters import (
     free_filters,
     lacking_filter,
@@ -49,6 +50,7 @@ from jointscope.graphs.scoring.regression.asked_by_regression import asked_by_re
 from jointscope.graphs.scoring.score_test import ScoreTest
 from jointscope.graphs.scoring.torque_readings import torque_readings
 from jointscope.graphs.scoring.wrong_masses import wrong_masses
+from jointscope.graphs.screening.current_delay import with_current_constants, with_current_delay
 from jointscope.graphs.screening.screen_all import screen_all
 from jointscope.graphs.solving.batch_solver import Progress, Solver, solve
 from jointscope.graphs.solving.estimate import Estimate
@@ -141,6 +143,9 @@ def _calibrated(
     notices = check_recordings(robot, recordings, every_joint=not biases_only)
     robot, found = told_drive_signal(robot, recordings)
     notices += found
+    if near is None:
+        robot, found = with_current_delay(robot, recordings)
+        notices += found
     if robot.noise.estimate:
         robot = without_lasting(robot)
     noise = _loose(robot.noise) if robot.noise.estimate and near is None else robot.noise
@@ -174,6 +179,7 @@ def _calibrated(
     else:
         solved = asked_at_standstill(stage, problems, noise, calibrations)
     solved = solved_with_filters(stage, solved, filters) if filters else solved
+    solved = solved_with_current_delay(stage, solved, recordings) if near is None else solved
     if not biases_only and not standstill:
         notices += sticking_joints(robot, solved.robot)
         robot = replace(robot, parameters=solved.robot.parameters)
@@ -264,7 +270,7 @@ def _windows_stage(
     if not hold:
         # the regression filters its signals and wants them long
         whole = [initial_states(problem, bag) for problem, bag in zip(problems, bags, strict=True)]
-        guess = initial_dynamics(problems, whole, bags[0])
+        guess = with_current_constants(initial_dynamics(problems, whole, bags[0]), robot, recordings)
         calibrations = [c.with_points({DYNAMICS: guess.dynamics}) for c in calibrations]
     windows, estimate = with_best_shifts(windows, Estimate(tuple(states), tuple(calibrations)), hold)
     # nearly linear in the states alone: bring them to the parameters before both move

@@ -26,6 +26,7 @@ from jointscope.graphs.screening.mistaken_transmission import MISTAKEN_TRANSMISS
 from jointscope.graphs.screening.saturated_drives import SATURATION
 from jointscope.graphs.solving.shared_layout import SharedLayout
 from jointscope.robots.model.robot import Robot
+from jointscope.robots.parts.motor_current import MotorCurrent
 from jointscope.robots.parts.process_noise import ProcessNoise
 from jointscope.robots.parts.sensors import AXES, Accelerometer, Gyro, LinkEncoder, MotorEncoder, Sensor
 from jointscope.robots.recordings.recording import Notice
@@ -206,6 +207,8 @@ def calibrated_robot(
         elif isinstance(sensor, Accelerometer):
             bias_sigma = np.array([table[f"{name}.bias.{axis}"].sigma for axis in AXES])
             sensors[name] = replace(sensor, bias=calibration.biases[name], bias_sigma=bias_sigma)
+        elif isinstance(sensor, MotorCurrent):
+            sensors[name] = used.sensors[name]
         elif isinstance(sensor, MotorEncoder | LinkEncoder):
             sensors[name] = replace(sensor, sigmas=used.sensors[name].sigmas)
     return replace(robot, parameters=new, noise=noise).with_sensors(sensors)

@@ -17,6 +17,7 @@ from jointscope.graphs.comparison.channel_errors import ChannelErrors
 from jointscope.graphs.comparison.error_concentration import EVERYWHERE, Concentration, shares
 from jointscope.graphs.problem.motion_regimes import AROUND_REVERSAL, NEAR, MotionRegimes
 from jointscope.robots.model.robot import Robot
+from jointscope.robots.parts.motor_current import MotorCurrent
 from jointscope.robots.parts.position_target import PositionTarget
 from jointscope.robots.parts.sensors import Accelerometer, Gyro, LinkEncoder, MotorEncoder
 
@@ -33,6 +34,7 @@ KINDS: Mapping[type, str] = {
     PositionTarget: "Target",
     MotorEncoder: "The motor encoder of",
     LinkEncoder: "The link encoder of",
+    MotorCurrent: "The current of",
 }
 
 

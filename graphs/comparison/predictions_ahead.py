@@ -20,7 +20,7 @@ from jointscope.graphs.comparison.prediction import Predictor
 from jointscope.graphs.problem.bag_problem import BagProblem
 from jointscope.graphs.problem.sensor_placement import ACCELERATION, COMMAND, factor_on_state, feels
 from jointscope.graphs.problem.timeline import Timeline
-from jointscope.robots.model.lateness import Lateness, late_channels
+from jointscope.robots.model.lateness import Lateness, late_channels, taken
 from jointscope.robots.model.robot import Robot
 
 Array = NDArray[np.float64]
@@ -141,8 +141,7 @@ def _groups(problem: BagProblem) -> list[_Group]:
         for channels, late in late_channels(problem.robot, name):
             lateness = Lateness.of(problem.robot, late, stamps)
             variance = lateness.variance(problem.robot.values)[0]
-            taken = stamps - lateness.anchor
-            found.append(_Group(name, channels, taken, feels(sensor), variance))
+            found.append(_Group(name, channels, taken(problem.robot, name, late, stamps), feels(sensor), variance))
     return found
 
 

@@ -28,13 +28,13 @@ from jointscope.factors.rescaled import RescaledFactor
 from jointscope.factors.some_channels import SomeChannels
 from jointscope.factors.vertical_gyro import VerticalGyroFactor
 from jointscope.graphs.problem.coarse_encoder import shared_error
-from jointscope.graphs.problem.timeline import Timeline
+from jointscope.graphs.problem.timeline import SAME, Timeline
 from jointscope.robots.dynamics.command_path import CommandPath
 from jointscope.robots.dynamics.spring_torques import SpringTorques
 from jointscope.robots.effect_kinds.effect import LINK_SIDE
 from jointscope.robots.effect_kinds.reading_effect import ReadingEffect
 from jointscope.robots.model.encoder_plays import EncoderPlays
-from jointscope.robots.model.lateness import Lateness, late_channels
+from jointscope.robots.model.lateness import Lateness, late_channels, taken
 from jointscope.robots.model.motor_currents import MotorCurrents
 from jointscope.robots.model.robot import Robot
 from jointscope.robots.parts.motor_current import MotorCurrent
@@ -82,12 +82,12 @@ def place_sensor(robot: Robot, recording: Recording, timeline: Timeline, name: s
             continue
         stream = recording.streams[name]
         lateness = Lateness.of(robot, late, stream.times)
-        taken = stream.times - lateness.anchor
+        times = taken(robot, name, late, stream.times)
         for rows, some in _as_measured(robot, recording, stream, name, channels):
-            inside = rows & (taken >= timeline.ticks[0]) & (taken <= timeline.ticks[-1])
+            inside = rows & (times >= timeline.ticks[0]) & (times <= timeline.ticks[-1])
             if behind == COMMAND:  # of a command before the first nothing is known
-                inside &= taken > timeline.ticks[0]
-            step, fraction = (timeline.locate_ending if behind else timeline.locate)(taken[inside])
+                inside &= times > timeline.ticks[0] + SAME
+            step, fraction = _located(timeline, times[inside], behind)
             inner = _some(_sensor_factor(robot, recording, name, stream, inside), some, robot.sensors[name])
             here = replace(lateness, stamps=lateness.stamps[inside], anchor=lateness.anchor[inside]) if late else None
             between = inner, fraction, timeline.h[step], robot.layout, here, robot.values
@@ -97,6 +97,14 @@ def place_sensor(robot: Robot, recording: Recording, timeline: Timeline, name: s
                 factor = (AcceleratedFactor if behind else InterpolatedFactor)(*between)
             placed.append(Placed(factor, step, stream.times[inside]))
     return placed
+
+
+def _located(timeline: Timeline, times: Array, behind: str) -> tuple[NDArray[np.intp], Array]:
+    """Steps and fractions; a sample that is a rounding error behind a command has not seen it."""
+    if behind != COMMAND:
+        return (timeline.locate_ending if behind else timeline.locate)(times)
+    step, _ = timeline.locate_ending(times - SAME)
+    return step, (times - timeline.ticks[step]) / timeline.h[step]
 
 
 def feels(sensor: Sensor) -> str:

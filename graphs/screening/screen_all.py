@@ -8,6 +8,7 @@ from operator import is_
 from jointscope.graphs.screening.encoder_jumps import JUMP, jump_notices
 from jointscope.graphs.screening.exchanged_joints import EXCHANGED, exchanged_joints
 from jointscope.graphs.screening.felt_gravity import FELT_GRAVITY, mistaken_accelerometers
+from jointscope.graphs.screening.mistaken_currents import MISTAKEN_CURRENT, mistaken_currents
 from jointscope.graphs.screening.mistaken_hold import MISTAKEN_HOLD, mistaken_hold
 from jointscope.graphs.screening.mistaken_torque_sensors import MISTAKEN_TORQUE, mistaken_torque_sensors
 from jointscope.graphs.screening.mistaken_transmission import MISTAKEN_TRANSMISSION, mistaken_transmission
@@ -27,6 +28,7 @@ PLAIN_MISTAKES = (
     JUMP,
     FELT_GRAVITY,
     MISTAKEN_TORQUE,
+    MISTAKEN_CURRENT,
     MISTAKEN_TRANSMISSION,
     MISTAKEN_HOLD,
     UNSTRETCHED,
@@ -61,6 +63,7 @@ def _screened(recording: Recording, robot: Robot) -> list[Notice]:
     odd += [*screen(recording, robot), *jump_notices(recording, robot)]
     odd += mistaken_accelerometers(recording, robot)
     odd += mistaken_torque_sensors(recording, robot)
+    odd += mistaken_currents(recording, robot)
     odd += mistaken_hold(recording, robot)
     odd += unstretched_springs(recording, robot)
     return [*odd, *(exchanged_joints(robot, [recording]) or saturated_drives(robot, [recording]))]

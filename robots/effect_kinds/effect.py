@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from jointscope.robots.effect_kinds.joint_torque import Memory
     from jointscope.robots.effect_kinds.robot_view import RobotView
 
-OWNER_KINDS = ("joint", "joint_link", "gyro", "link_encoder", "motor_current", "target", "robot")
+OWNER_KINDS = ("joint", "joint_link", "gyro", "link_encoder", "target", "robot")
 LINK_SIDE = ".link"  # behind a joint's name: its encoder on the link
 
 
@@ -95,8 +95,7 @@ class Effect(ABC):
         card: what a user reads.
         parameters: of every instance; kinds whose parameters depend on the owner override `parameters_of`.
         owners: kinds of owners: some of "joint", "joint_link" (a joint's encoder on the link, JOINT.link), "gyro",
-            "link_encoder" (all of those together), "motor_current" (of all motors together), "target" (of a tracker),
-            "robot".
+            "link_encoder" (all of those together), "target" (of a tracker), "robot".
         turning: whether it can act only on joints that turn, not on prismatic ones.
         example: sizes for tests and demonstrations on the ready robots, by parameter name.
         aliases: other names that users may type.
@@ -125,7 +124,6 @@ class Effect(ABC):
         joints = tuple(joint for joint in robot.joints if not (self.turning and joint in robot.tree.slides))
         links = tuple(f"{joint}{LINK_SIDE}" for joint in joints) if on_links else ()
         by_kind = {"joint": joints, "joint_link": links, "gyro": gyros, "link_encoder": on_links, "robot": ("robot",)}
-        by_kind["motor_current"] = () if robot.motor_current is None else (robot.motor_current.name,)
         by_kind["target"] = tuple(target.name for target in robot.targets)
         return tuple(owner for kind in self.owners for owner in by_kind[kind])
 

@@ -8,7 +8,6 @@ from typing import Protocol
 
 from jointscope.robots.bodies.rigid_tree import RigidTree
 from jointscope.robots.parts.model_choices import ModelChoices
-from jointscope.robots.parts.motor_current import MotorCurrent
 from jointscope.robots.parts.parameter import Parameter
 from jointscope.robots.parts.position_target import PositionTarget
 from jointscope.robots.parts.sensors import Accelerometer, Gyro, LinkEncoder, MotorEncoder, Topic
@@ -56,10 +55,6 @@ class RobotView(Protocol):
     @property
     def targets(self) -> Sequence[PositionTarget]:
         """All targets that a tracker measures."""
-
-    @property
-    def motor_current(self) -> MotorCurrent | None:
-        """The measured currents of the motors, if there are any."""
 
     @property
     def motor_encoder(self) -> MotorEncoder:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""A reading of an encoder, of a tracker, or of the motors' currents that is older than its stamp."""
+"""A reading of an encoder, or of a tracker, that is older than its stamp."""
 
 from __future__ import annotations
 
@@ -27,34 +27,28 @@ def late(stamps: Array, p: Mapping[str, float]) -> tuple[Array, dict[str, Array]
 
 @dataclass(frozen=True, kw_only=True)
 class EncoderDelay(TimeShift):
-    """A delay, of some sensors of either sign.
-
-    A tracker may have a clock of its own that is ahead, and a current may be read just after the command of its stamp.
-    """
+    """A delay, of a target of either sign: its tracker may have a clock of its own that is ahead."""
 
     def parameters_of(self, robot: RobotView, owner: str) -> tuple[EffectParameter, ...]:
-        """Without a sign where a tracker gives the stamps, and of currents."""
-        current = robot.motor_current
-        either = owner in [target.name for target in robot.targets] or (current is not None and owner == current.name)
-        return tuple(replace(p, sign="+-") for p in self.parameters) if either else self.parameters
+        """Without a sign where a tracker gives the stamps."""
+        of_target = any(target.name == owner for target in robot.targets)
+        return tuple(replace(p, sign="+-") for p in self.parameters) if of_target else self.parameters
 
 
 EFFECT = EncoderDelay(
     id="encoder_delay",
-    owners=("joint", "link_encoder", "motor_current", "target", "robot"),
+    owners=("joint", "link_encoder", "target", "robot"),
     late=late,
     sensors="encoder",
     parameters=(EffectParameter("delay", "s", start=1e-3, prior_sigma=0.5, sign="+"),),
     example={"delay": 3e-3},
-    aliases=("current_delay",),
     card=Card(
         title="position older than its stamp",
         law="reading(t) = q_motor(t - delay), or q_link(t - delay) for the encoders on the links; of a target "
-        "p(t - delay); of currents i(t - delay)",
+        "p(t - delay)",
         explanation="Sampling, transport and driver take their time before the reading gets its stamp. For a single "
         "joint: its encoder is read later than those of the others. Cameras expose, compute and send for tens of "
-        "milliseconds; where they have a clock of their own, it may be ahead, and the delay is below zero. "
-        "So it is of currents that are read after the command of their stamp acts.",
+        "milliseconds; where they have a clock of their own, it may be ahead, and the delay is below zero.",
         source="Kelly, Sukhatme (2014), A general framework for temporal calibration of multiple proprioceptive and "
         "exteroceptive sensors, in Experimental Robotics, Springer",
         typical="0.1 to 10 ms; of cameras and motion capture 5 to 100 ms",

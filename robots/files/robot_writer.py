@@ -55,6 +55,10 @@ def robot_text(robot: Robot, folder: Path, provenance: Mapping[str, Any] | None 
     for encoder in (robot.motor_encoder, robot.link_encoder):
         if encoder is not None:
             _write_sigmas(document["sensors"][encoder.name], encoder.sigmas)
+    if robot.motor_current is not None and robot.motor_current.delay_sigma is not None:
+        delay = document["sensors"][robot.motor_current.name].setdefault("delay", _flow({}))
+        delay["value"] = _rounded(robot.motor_current.delay)
+        delay["sigma"] = _rounded(robot.motor_current.delay_sigma, 3)
     for sensor in robot.accelerometers:
         bias = document["sensors"][sensor.name].setdefault("bias", _flow({}))
         bias["value"] = _row(sensor.bias)

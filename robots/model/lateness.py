@@ -13,6 +13,7 @@ from jointscope.robots.effect_kinds.effect_at import EffectAt
 from jointscope.robots.effect_kinds.smoothed_reading import SmoothedReading
 from jointscope.robots.effect_kinds.time_shift import TimeShift
 from jointscope.robots.model.robot import Robot
+from jointscope.robots.parts.motor_current import MotorCurrent
 from jointscope.robots.parts.sensors import Accelerometer, MotorEncoder
 
 Array = NDArray[np.float64]
@@ -56,6 +57,13 @@ class Lateness:
             here.parameter(here.effect.variance) for here in self.effects if isinstance(here.effect, SmoothedReading)
         ]
         return sum(values[name] for name in names), dict.fromkeys(names, 1.0)
+
+
+def taken(robot: Robot, name: str, effects: tuple[EffectAt, ...], stamps: Array) -> Array:
+    """When samples of a sensor were really taken, by effects and by its own delay, shape (m,) [s]."""
+    sensor = robot.sensors[name]
+    own = sensor.delay if isinstance(sensor, MotorCurrent) else 0.0
+    return stamps - Lateness.of(robot, effects, stamps).anchor - own
 
 
 def late_channels(robot: Robot, name: str) -> list[tuple[NDArray[np.intp], tuple[EffectAt, ...]]]:

@@ -25,12 +25,18 @@ class MotorCurrent:
         source: topic.
         sigmas: standard deviation of the noise of each motor, shape (n_joints,) [A].
         joints: names of the joints.
+        delay: how much older a reading is than its stamp [s]; below zero where it sees the command of its own stamp.
+        delay_sigma: half of the range of delays that fit as well, after a calibration [s]; None before.
+        estimate_delay: whether a calibration may find another delay.
     """
 
     name: str
     source: Topic
     sigmas: NDArray[np.float64]
     joints: tuple[str, ...]
+    delay: float = 0.0
+    delay_sigma: float | None = None
+    estimate_delay: bool = True
 
     @property
     def channels(self) -> tuple[str, ...]:

@@ -17,13 +17,14 @@ from jointscope.robots.effect_kinds.effect_at import EffectAt
 from jointscope.robots.errors import EstimatorError
 from jointscope.robots.model.lateness import Lateness, late_channels
 from jointscope.robots.model.robot import Robot
+from jointscope.robots.parts.motor_current import MotorCurrent
 from jointscope.robots.parts.position_target import PositionTarget
 from jointscope.robots.parts.sensors import Accelerometer, Gyro
 
 Array = NDArray[np.float64]
 
 LONGEST_DOUBT = 6  # commands in a row of which some joint lacks its own: that joint's drive may do anything then
-NOISY = (Gyro, Accelerometer, PositionTarget)  # sensors that never repeat a sample, as coarse encoders do
+NOISY = (Gyro, Accelerometer, MotorCurrent, PositionTarget)  # sensors that never repeat a sample, as coarse encoders do
 LARGEST = 1e6  # [SI] no angle, rate or command is larger; beyond it a number is as good as none
 
 
@@ -45,6 +46,7 @@ class SampleIntake:
         self._checks = {"command": SampleChecks([0.0] * robot.n, False)}
         self._sigmas = {name: s.sigmas for name, s in robot.sensors.items()}
         self._groups = {name: late_channels(robot, name) for name in robot.sensors}
+        self._delays = {name: s.delay if isinstance(s, MotorCurrent) else 0.0 for name, s in robot.sensors.items()}
         for name, sensor in robot.sensors.items():
             self._checks[name] = SampleChecks(sensor.sigmas.tolist(), isinstance(sensor, NOISY))
 
@@ -121,7 +123,7 @@ class SampleIntake:
             if bad or stuck:
                 channels = np.setdiff1d(channels, [*bad, *stuck])
             if len(channels):
-                taken = t - _lateness(effects, t, self._values) if effects else t
+                taken = t - self._delays[name] - (_lateness(effects, t, self._values) if effects else 0.0)
                 whole = len(channels) == len(found)
                 chosen = (found, sigma) if whole else (found[channels], sigma[channels])
                 variance = Lateness(effects, found, found).variance(self._values)[0]

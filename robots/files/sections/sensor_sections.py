@@ -31,6 +31,7 @@ Array = NDArray[np.float64]
 GYRO_FORMS = ("full", "vertical", "relative")
 KINDS = ("motor_encoder", "link_encoder", "joint_torque", "motor_current", "gyro", "accelerometer", "position_target")
 UNKNOWN = "unknown"
+LONGEST_DELAY = 0.1  # [s] of currents; beyond it a number was meant in milliseconds
 
 
 def topic(section: Section, joints: tuple[str, ...] = (), units: tuple[str, ...] = (), scaled: bool = False) -> Topic:
@@ -159,7 +160,23 @@ def _motor_current(name: str, section: Section, joints: tuple[str, ...]) -> Moto
             f"{section.place}.unit: a current is in A or mA, got {wrong!r}; of a torque that the drive works out from "
             "its current, write A: what one unit makes is a parameter of its own"
         )
-    return MotorCurrent(name, source, _sigmas(section, joints), joints)
+    delay = section.section("delay", {"value": 0.0})
+    found = MotorCurrent(
+        name=name,
+        source=source,
+        sigmas=_sigmas(section, joints),
+        joints=joints,
+        delay=delay.number("value", 0.0),
+        delay_sigma=delay.number("sigma", None, positive=True),
+        estimate_delay=section.flag("estimate_delay", True),
+    )
+    delay.finish()
+    if abs(found.delay) > LONGEST_DELAY:
+        raise RobotError(
+            f"{section.place}.delay.value: expected seconds, at most {LONGEST_DELAY:g}, got {found.delay:g}; "
+            "3 ms are 0.003"
+        )
+    return found
 
 
 def _vectors(section: Section, unit: str, expected: str) -> Topic:

@@ -16,10 +16,10 @@ Array = NDArray[np.float64]
 
 
 class EncoderDelay(SimulatedEffect):
-    """The encoder of one joint, those of all, all on the links, a tracker with its target, or all currents are late."""
+    """The encoder of one joint, those of all, all encoders on the links, or a tracker with its target are late."""
 
     id = "encoder_delay"
-    acts_on = ("joint", "robot", "target", "link encoders", "motor currents")
+    acts_on = ("joint", "robot", "target", "link encoders")
     defaults: ClassVar[Mapping[str, float]] = {"delay": 2e-3}  # [s]
     never_negative = ("delay",)
 

@@ -175,6 +175,7 @@ class SampledCurrent(SampledSensor):
     ):
         super().__init__(sensor, engine, sampling, stamps, seed)
         self._motor, self._sigmas, known = engine.motor, sensor.sigmas, robot.values
+        self._delay = sensor.delay
         gain = engine.drive_gains
         n_kt = [known.get(sensor.torque_per_ampere(joint), g) for joint, g in zip(robot.joints, gain, strict=True)]
         self._n_kt, volts = np.array(n_kt), robot.command.unit in ("duty", "V")
@@ -187,7 +188,7 @@ class SampledCurrent(SampledSensor):
 
     def given_out(self, trajectory: Trajectory, rows: Rows) -> Array:
         """Currents, shape (k, n_joints) [A]."""
-        times = self.taken[rows] - self._age[0]
+        times = self.taken[rows] - self._age[0] - self._delay
         v = trajectory.at(times)[1][:, self._motor]
         amperes = trajectory.command(times) * self._gain / self._n_kt - self._lost * v
         amperes = distort(self._effects, self.sensor, self.stamps[rows], amperes)

@@ -52,7 +52,7 @@ class SimulatedEffect:
         parameters: all values by name.
         id: name of the effect, that of its file.
         acts_on: kinds of owners, of "joint", "elastic joint", "last joint", "imu", "target", "robot", "upright robot",
-            "link encoders", "motor currents" and "weighed elastic joint".
+            "link encoders" and "weighed elastic joint".
         defaults: parameters with their sizes; an effect without fixed ones overrides `default_parameters`.
         null: the value of a size at which the effect vanishes; zero but for ratios.
         never_negative: parameters that must not be negative.
@@ -196,8 +196,6 @@ def owners_of(kind: str, robot: Robot) -> tuple[str, ...]:
         return tuple(gyro.name for gyro in robot.gyros)
     if kind == "link encoders":
         return () if robot.link_encoder is None else (robot.link_encoder.name,)
-    if kind == "motor currents":
-        return () if robot.motor_current is None else (robot.motor_current.name,)
     if kind == "target":
         return tuple(target.name for target in robot.targets)
     elastic = tuple(joint for joint in robot.joints if joint in robot.layout.motors)
