@@ -10,6 +10,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,10 +18,10 @@ from numpy.typing import NDArray
 from jointscope.factors.calibration import DYNAMICS, Calibration, rotation_block
 from jointscope.graphs.calibration.calibration_result import CalibrationResult
 from jointscope.graphs.calibration.calibration_summary import summarize
+from jointscope.graphs.calibration.causes import asked_for_causes
 from jointscope.graphs.calibration.current_delay import solved_with_current_delay
 from jointscope.graphs.calibration.encoder_filters import (
     free_filters,
-    lacking_filter,
     solved_with_filters,
     with_filters,
 )
@@ -34,7 +35,7 @@ from jointscope.graphs.calibration.friction_at_standstill import (
 from jointscope.graphs.calibration.stages.encoder_noise import with_visible_noise
 from jointscope.graphs.calibration.stages.history import History
 from jointscope.graphs.calibration.stages.solved import Solved
-from jointscope.graphs.calibration.stages.solved_windows import anchored, tested_on_windows
+from jointscope.graphs.calibration.stages.solved_windows import anchored
 from jointscope.graphs.calibration.stages.whole_stage import LOOSE, WholeStage, blunt_sharpness, blunted
 from jointscope.graphs.calibration.turned_mounting import held, released, turned_without_reason
 from jointscope.graphs.gtsam_solvers.samples_solver import must_be_short, solve_samples
@@ -42,14 +43,7 @@ from jointscope.graphs.noise.lasting_noise import without_lasting
 from jointscope.graphs.noise.noise_estimation import estimate_noise, not_below
 from jointscope.graphs.problem.bag_problem import BagProblem
 from jointscope.graphs.problem.standstill import leaving_standstill_out
-from jointscope.graphs.problem.step_errors import inertia_shifts
 from jointscope.graphs.problem.windows import windows_of
-from jointscope.graphs.scoring.drive_timing import drive_timing
-from jointscope.graphs.scoring.lacking_effects import Suspects, lacking_effects
-from jointscope.graphs.scoring.regression.asked_by_regression import asked_by_regression
-from jointscope.graphs.scoring.score_test import ScoreTest
-from jointscope.graphs.scoring.torque_readings import torque_readings
-from jointscope.graphs.scoring.wrong_masses import wrong_masses
 from jointscope.graphs.screening.current_delay import with_current_constants, with_current_delay
 from jointscope.graphs.screening.screen_all import screen_all
 from jointscope.graphs.solving.batch_solver import Progress, Solver, solve
@@ -142,10 +136,10 @@ def _calibrated(
     """One calibration; arguments as in `calibrate`."""
     notices = check_recordings(robot, recordings, every_joint=not biases_only)
     robot, found = told_drive_signal(robot, recordings)
-    notices += found
     if near is None:
-        robot, found = with_current_delay(robot, recordings)
-        notices += found
+        robot, late = with_current_delay(robot, recordings)
+        found += late
+    notices += found
     if robot.noise.estimate:
         robot = without_lasting(robot)
     noise = _loose(robot.noise) if robot.noise.estimate and near is None else robot.noise
@@ -174,10 +168,8 @@ def _calibrated(
     stated = {e.name: e.sigmas for e in (seen.motor_encoder, seen.link_encoder) if e is not None}
     anew = near is None and not biases_only
     stage = WholeStage(hold, history, _part(report, 0.4, 1.0), anew, solver, sets, stated)
-    if biases_only or standstill:
-        solved = stage.solve(problems, noise, calibrations)
-    else:
-        solved = asked_at_standstill(stage, problems, noise, calibrations)
+    solve_all = stage.solve if biases_only or standstill else partial(asked_at_standstill, stage)
+    solved = solve_all(problems, noise, calibrations)
     solved = solved_with_filters(stage, solved, filters) if filters else solved
     solved = solved_with_current_delay(stage, solved, recordings) if near is None else solved
     if not biases_only and not standstill:
@@ -188,7 +180,7 @@ def _calibrated(
     result = summarize(robot, solved, tuple(history.records), notices, hold)
     solved = replace(solved, spreads=[])  # they are large, and all that they say has been said
     if near is None and not biases_only:
-        result = _asked_for_causes(result, solved, stage if memory else None, recordings)
+        result = asked_for_causes(result, solved, stage if memory else None, recordings)
         if memory and not result.has_named_causes:  # else torques that last would hide them
             lasting = stage.with_memory(solved)
             if lasting is not solved:
@@ -200,40 +192,14 @@ def _calibrated(
     if any(recording.sticking for recording in told):
         if near is not None and robot.noise.estimate:  # the noise at hand is that of another model
             noise = noise_with_standstills(recordings, solved, noise)
-        moving = solved.problems[0].dynamics.steps.noise
-        noise = with_standstills(result.noise, moving, noise)
-        result = replace(result, robot=replace(result.robot, noise=noise))
+        result = _with_noise_of_standstills(result, solved, noise)
     return result
 
 
-def _asked_for_causes(
-    result: CalibrationResult, solved: Solved, stage: WholeStage | None, recordings: Sequence[Recording]
-) -> CalibrationResult:
-    """With what a linear step says of late signals, of masses and, with a stage to try more, of the whole catalogue."""
-    suspects = _suspects(solved) if stage else None
-    give_back_memory()  # that of windows, before all samples need as much
-    test = ScoreTest.of(*solved.of_motions, solved.eliminations)
-    lacking = lacking_effects(test, suspects) if suspects is not None else ()
-    smoothed = lacking_filter(stage, solved) if stage else None
-    if smoothed is not None and smoothed.moved(result.found):
-        lacking = (smoothed, *(other for other in lacking if other.effect != smoothed.effect))
-    shifts: dict[str, float] = {}
-    for motion in zip(*solved.of_motions, strict=True):
-        shifts |= {n: s for n, s in inertia_shifts(*motion).items() if abs(s) > abs(shifts.get(n, 0.0))}
-    timing, masses = drive_timing(test), wrong_masses(test)
-    result = replace(result, timing=timing, masses=masses, lacking=lacking, inertia_shifts=shifts)
-    result = replace(result, torque_readings=torque_readings(test))
-    if stage is None or result.saturated or result.exchanged:
-        return result
-    return replace(
-        result, asked=asked_by_regression(replace(result.robot, sensors=result.start.sensors), recordings, test)
-    )
-
-
-def _suspects(solved: Solved) -> Suspects:
-    """What a part of the samples does not rule out, where there are many."""
-    suspects, windows = Suspects.of(solved.robot), tested_on_windows(solved)
-    return suspects if windows is None else suspects.left_by(windows)
+def _with_noise_of_standstills(result: CalibrationResult, solved: Solved, noise: ProcessNoise) -> CalibrationResult:
+    """The result with noise that standstills were asked for, too."""
+    moving = solved.problems[0].dynamics.steps.noise
+    return replace(result, robot=replace(result.robot, noise=with_standstills(result.noise, moving, noise)))
 
 
 def check_recordings(robot: Robot, recordings: Sequence[Recording], every_joint: bool = True) -> list[Notice]:
