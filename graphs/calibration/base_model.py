@@ -85,8 +85,8 @@ class BaseModel:
         """
         if by_torques is None:
             by_torques = start.by_torques if start is not None else seen_by_one_encoder(robot)
-        torques = [robot.torque_sensor] if robot.torque_sensor is not None else []
-        full = with_full_gyros(robot).without(torques)  # no column of the score test says what these would see
+        # no column of the score test says what these would see
+        full = with_full_gyros(robot).without([s for s in (robot.torque_sensor, robot.motor_current) if s is not None])
         full = without_lasting(full)  # what is missing must not hide in torques that last
         full = holding_sharpness(full, recordings)  # nor in a friction that is rounded off
         near = [calibration for calibration in start.calibrations] if start is not None else None

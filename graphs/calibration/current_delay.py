@@ -56,6 +56,8 @@ def solved_with_current_delay(stage: WholeStage, solved: Solved, recordings: Seq
         assert sensor is not None
         step, sigma = _step(solved, sensor)
         late = float(np.clip(sensor.delay + step, gap.first, gap.last))
+        if abs(late) < sigma and gap.first <= 0.0 < gap.last:
+            late = 0.0
         near = abs(late - sensor.delay) < NEAR * sigma
         moved = replace(sensor, delay=sensor.delay if near else late, delay_sigma=min(sigma, gap.sigma))
         robot = solved.robot.with_sensors({sensor.name: moved})

@@ -85,6 +85,10 @@ class MotorCurrents:
         constant = np.array([values[name] for name in self._constant])
         return constant, np.array([self._of(values, name, 0.0) for name in self._back_emf])
 
+    def sources(self, joint: int) -> tuple[str, ...]:
+        """Full names of the parameters that the back-EMF of a joint is made of."""
+        return tuple(name for name in (self._constant[joint], self._back_emf[joint]) if name is not None)
+
     def _slopes(self, values: Mapping[str, float]) -> tuple[Array, Array, Array]:
         """By command and speed, and offsets, shape (n,) each."""
         constant, back_emf = self.constants(values)

@@ -127,7 +127,7 @@ class Notice:
         stream: name of the stream.
         kind: one of "unit", "axes", "mirrored", "gravity", "torque", "limit", "saturation", "jump", "clock",
             "foreign", "glitch", "dropped", "gap", "staircase", "posture", "mimic", "coarse", "clipping",
-            "end_stop", "out_of_order", "duplicate", "info", "jitter".
+            "end_stop", "out_of_order", "duplicate", "info", "jitter", "current".
         count: number of samples concerned.
         text: the whole sentence for the user.
     """

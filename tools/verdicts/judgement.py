@@ -15,6 +15,7 @@ from jointscope.graphs.noise.robust_sigma import BLOCK, FEWEST_BLOCKS
 from jointscope.robots.geometry.error_parameters import is_geometry
 from jointscope.robots.parts.relative_sigma import NOT_DETERMINED, relative_sigma
 from jointscope.tools.presentation.numbers import significant
+from jointscope.tools.verdicts.currents_and_volts import currents_and_volts
 from jointscope.tools.verdicts.given_recordings import given
 from jointscope.tools.verdicts.missing_effects import missing_effects
 from jointscope.tools.verdicts.plausible_torques import plausible_torques
@@ -108,6 +109,7 @@ def judge(result: CalibrationResult) -> Judgement:
         Check(*same_by_regression(result)),
         *(Check(*each) for each in same_values(result)),
         *(Check(*each) for each in rests_agree(result)),
+        *(Check(*each) for each in currents_and_volts(result)),
         _constants(result),
         Check(plausible[0], "Masses and torques that go together", plausible[1]),
         Check(missing[0], "Values that no missing effect would change", missing[1]),
