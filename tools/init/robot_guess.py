@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
@@ -21,11 +21,11 @@ from jointscope.robots.recordings.recording import Stream
 from jointscope.robots.units import si_factor
 from jointscope.robots.urdf.urdf_bodies import UrdfBodies
 from jointscope.robots.urdf.usable_joints import moving_joints
-from jointscope.tools.bags.messages.joined_topics import parts_of
 from jointscope.tools.bags.messages.open_bag import Progress
 from jointscope.tools.init.estimates.drive_values import EXPLAINED, TYPED, Drives, DriveValues, find_drives, find_signs
 from jointscope.tools.init.estimates.gyro_mount import Mount, find_mount, seen_rate
 from jointscope.tools.init.estimates.joint_signs import SignGuess, encoder_signs
+from jointscope.tools.init.estimates.measured_currents import GuessedCurrents, guess_currents
 from jointscope.tools.init.estimates.measured_robot import GRAVITY, MeasuredRobot, measured_robot, role_stream
 from jointscope.tools.init.estimates.motor_zero import motor_zero
 from jointscope.tools.init.estimates.position_units import UnitGuess, seen_rates
@@ -36,6 +36,7 @@ from jointscope.tools.init.streams.roles import Roles
 from jointscope.tools.init.streams.sample_times import guess_sample_times
 from jointscope.tools.init.streams.sensor_noise import NoiseGuess, guess_noise
 from jointscope.tools.init.streams.signals import Signal, read_signals
+from jointscope.tools.init.unused import unused
 
 Array = NDArray[np.float64]
 
@@ -79,6 +80,7 @@ class RobotGuess:
         gravity: in the base frame [m/s^2].
         gravity_reason: why it does not point along -z; empty if it does.
         held_command: whether each value of the command acts until the next one; else it was measured.
+        currents: of the motors, where efforts beside their positions seem to be that.
         exchanged: two joints that seem to have each other's columns.
     """
 
@@ -105,6 +107,7 @@ class RobotGuess:
     gravity: tuple[float, ...] = GRAVITY
     gravity_reason: str = ""
     held_command: bool = True
+    currents: GuessedCurrents | None = None
     exchanged: Exchange | None = None
 
     @property
@@ -148,9 +151,7 @@ def guess_robot(typed: Typed, progress: Progress | None = None) -> RobotGuess:
     if masses and robot.links is not None:
         zero = motor_zero(turned, seen, _in_si(robot, noises))
         turned = replace(turned, values=turned.values - zero)
-    gyros, left_out = _gyros(tree, seen, roles.imus, robot.gyros, signs)
-    felt = {signal.topic: signal for signal in signals if signal.quantity == "acceleration"}
-    gyros = [replace(gyro, acceleration=felt.get(gyro.signal.topic)) for gyro in gyros]
+    gyros, left_out = _gyros(tree, seen, zip(roles.imus, robot.gyros, strict=True), signals, signs)
     giving, behind = _giving(robot, turned, seen, noises, of_links)
     elastic = (*_seen(tree, gyros), *giving) if masses else ()
     drive, exchanged = drives(turned, elastic, behind), None
@@ -159,6 +160,7 @@ def guess_robot(typed: Typed, progress: Progress | None = None) -> RobotGuess:
         if others is not None:
             signs = others
             drive = drives(replace(encoder, values=encoder.values * np.array(signs.signs)))
+    currents = guess_currents(roles, turned, drive)
     return RobotGuess(
         name=typed.name or typed.urdf.stem,
         urdf=typed.urdf,
@@ -173,11 +175,12 @@ def guess_robot(typed: Typed, progress: Progress | None = None) -> RobotGuess:
         gravity_reason=drive.gravity_reason,
         held_command=drive.held,
         exchanged=exchanged,
+        currents=currents,
         encoder_noise=noises,
         link_noise=of_links,
         torque_noise=None if torque is None else guess_noise(torque.times, torque.values, "N m"),
         gyros=gyros,
-        left_out=left_out + _unused(signals, roles, masses),
+        left_out=left_out + unused(signals, roles, masses, currents),
         slides=tree.slides,
         stamped_by=_sample_times(roles, gyros),
         elastic=elastic,
@@ -263,20 +266,26 @@ def _giving(
 
 
 def _gyros(
-    tree: RigidTree, encoder: Stream, imus: Sequence[Signal], streams: Sequence[Stream], signs: SignGuess
+    tree: RigidTree,
+    encoder: Stream,
+    imus: Iterable[tuple[Signal, Stream]],
+    signals: Sequence[Signal],
+    signs: SignGuess,
 ) -> tuple[list[GuessedGyro], list[str]]:
-    """Gyroscopes with their links, and a sentence for each one that is on none."""
+    """Gyroscopes with their links and what their messages say of accelerations; a sentence for each that is on none."""
+    felt = {signal.topic: signal for signal in signals if signal.quantity == "acceleration"}
     motion = joint_motion(encoder, np.zeros(encoder.values.shape[1]))
     found: list[GuessedGyro] = []
     left_out = []
-    for signal, stream in zip(imus, streams, strict=True):
+    for signal, stream in imus:
         seen = seen_rate(motion, stream, ENOUGH)
         mount = None if seen is None else find_mount(tree, seen, mirrored=signs.mirrored)
         if mount is None:
             left_out.append(f"{signal.topic}: stands still, or no link turns like it")
             continue
         name = _sensor_name(signal.topic, [gyro.name for gyro in found])
-        found.append(GuessedGyro(name, signal, mount, guess_noise(stream.whole.times, stream.whole.values, mount.unit)))
+        noise = guess_noise(stream.whole.times, stream.whole.values, mount.unit)
+        found.append(GuessedGyro(name, signal, mount, noise, felt.get(signal.topic)))
     return found, left_out
 
 
@@ -287,14 +296,3 @@ def _sensor_name(topic: str, taken: Sequence[str]) -> str:
     while name in taken:
         name, number = f"{name.rstrip('0123456789')}{number}", number + 1
     return name
-
-
-def _unused(signals: Sequence[Signal], roles: Roles, masses: bool) -> list[str]:
-    chosen = [roles.command, roles.motor_encoder, *([roles.link_encoder] if roles.link_encoder else [])]
-    whole = [*(role.signal.topic for role in chosen), *(s.topic for s in roles.imus)]
-    used = {*whole, *(part for topic in whole for part in parts_of(topic))}
-    said = [f"{topic}: no role found for it" for topic in dict.fromkeys(s.topic for s in signals) if topic not in used]
-    if roles.joint_torque is not None and masses:
-        topic = roles.joint_torque.signal.topic
-        said.append(f"{topic}, effort: torques of joints are measured at springs, and joints are rigid here")
-    return said

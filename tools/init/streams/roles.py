@@ -14,6 +14,7 @@ import numpy as np
 
 from jointscope.robots.errors import RecordingError
 from jointscope.robots.recordings.screening import MIN_SAMPLES
+from jointscope.tools.init.streams.efforts import effort_beside, torque_behind
 from jointscope.tools.init.streams.joint_topics import DRIVEN
 from jointscope.tools.init.streams.known_fields import IMU
 from jointscope.tools.init.streams.named_signal import Chosen, NamedSignal, Wish, are_goals, by_place, named_signal
@@ -34,6 +35,7 @@ class Roles:
         imus: gyroscopes, in the order of the bag.
         stances: joints of the URDF that the bag knows, and whether they move.
         driven: joints whose command or measured effort varies.
+        motor_effort: what motors report beside their positions, where something else drives them.
         no_number: joints whose positions are no numbers in most messages.
     """
 
@@ -45,6 +47,7 @@ class Roles:
     imus: tuple[Signal, ...]
     stances: Mapping[str, Stance] = field(default_factory=dict)
     driven: tuple[str, ...] = ()
+    motor_effort: Chosen | None = None
     no_number: tuple[str, ...] = ()
 
 
@@ -99,7 +102,8 @@ def assign_roles(
         motor_encoder=encoder,
         command=drive.chosen(joints, reason, sure),
         link_encoder=link,
-        joint_torque=_torque(signals, link_side, urdf_joints, wish, joints),
+        joint_torque=torque_behind(signals, link_side, urdf_joints, wish, joints),
+        motor_effort=effort_beside(signals, motors, drive, urdf_joints, wish, joints),
         imus=tuple(s for s in signals if s.msgtype == IMU and s.quantity == "rate"),
         stances=stance,
         driven=tuple(joint for joint in urdf_joints if drive.varies(joint)),
@@ -281,20 +285,3 @@ def _driving(
     if signal.topic == motors.signal.topic and not motors.signal.names:
         return NamedSignal(signal, motors.names)  # of the same message, in the same order
     return by_place(signal, fits, moving)
-
-
-def _torque(
-    signals: list[Signal],
-    link_side: list[NamedSignal],
-    urdf_joints: tuple[str, ...],
-    wish: Wish,
-    joints: tuple[str, ...],
-) -> Chosen | None:
-    """Torques that are measured behind the motors."""
-    topics = [n.signal.topic for n in link_side]
-    for signal in signals:
-        if signal.quantity == "effort" and signal.topic in topics:
-            named = named_signal(signal, urdf_joints, wish)
-            if all(named.varies(joint) for joint in joints):
-                return named.chosen(joints, "efforts beside the positions of the links", False)
-    return None

@@ -15,6 +15,7 @@ from jointscope.tools.init.robot_guess import SUPPLY, RobotGuess
 from jointscope.tools.init.streams.named_signal import Chosen
 from jointscope.tools.init.streams.sensor_noise import NoiseGuess
 from jointscope.tools.init.text.accelerometer_text import accelerometer_lines
+from jointscope.tools.init.text.current_text import current_lines, current_parameters
 from jointscope.tools.init.text.drive_text import effect_lines, parameter_lines
 from jointscope.tools.init.text.gyro_text import gyro_lines
 from jointscope.tools.init.text.held_text import held_lines
@@ -59,7 +60,7 @@ def robot_text(guess: RobotGuess, urdf: str, targets: Sequence[GuessedTarget] = 
         "sensors:",
         *_motor_encoder(guess),
         *_link_encoder(guess),
-        *(_torque(guess) if free else ()),
+        *(_torque(guess) if free else current_lines(guess)),
         *(line for gyro in guess.gyros for line in gyro_lines(gyro, guess.encoder_signs)),
         *(line for gyro in guess.gyros if not free for line in accelerometer_lines(gyro, guess.gravity)),
         *(line for target in targets for line in target_lines(target)),
@@ -67,6 +68,7 @@ def robot_text(guess: RobotGuess, urdf: str, targets: Sequence[GuessedTarget] = 
         "",
         *effect_lines(guess),
         *parameter_lines(guess),
+        *([] if free else current_parameters(guess)),
         *target_parameters(targets),
         *([] if free else _noise(len(joints))),
     ]

@@ -1,0 +1,53 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Lines of a robot file about measured currents."""
+
+from __future__ import annotations
+
+from jointscope.robots.units import of_slide
+from jointscope.tools.init.estimates.measured_currents import GuessedCurrents
+from jointscope.tools.init.robot_guess import RobotGuess
+from jointscope.tools.init.text.drive_text import LOST_SPREAD, SPREAD
+from jointscope.tools.init.text.robot_line import GUESS, as_list, line, number
+from jointscope.tools.init.text.source_text import source_lines
+
+NAME = "motor_current"
+SMALLEST = 1e-6  # [A] sigma below which nothing was to be seen
+
+
+def current_lines(guess: RobotGuess) -> list[str]:
+    """The sensor; empty where none was found."""
+    found = guess.currents
+    if found is None:
+        return []
+    said = f"efforts that the motors report; commands and speeds leave {100.0 * found.share:.2g} % of them at most"
+    source = source_lines(found.chosen.signal, "A")
+    source[-1] = line("unit: A", "nothing in the recording says so; see the driver", False, 4)
+    names = [f"    names: {as_list(found.chosen.names)}"] if found.chosen.names != guess.roles.joints else []
+    turned = "against the commands"
+    signs = [line(f"scale: {as_list(found.signs)}", turned, False, 4)] if min(found.signs) < 0.0 else []
+    sigmas = ", ".join(number(max(noise.sigma, SMALLEST)) for noise in found.noise)
+    reasons = "; ".join(dict.fromkeys(noise.reason for noise in found.noise))
+    return [
+        f"  {NAME}:",
+        line(f"kind: {NAME}", said, False, 4),
+        *source,
+        *(names if found.chosen.names else []),
+        *signs,
+        line(f"sigma: [{sigmas}]", f"[A] {reasons}", False, 4),
+    ]
+
+
+def current_parameters(guess: RobotGuess) -> list[str]:
+    """Torque of one ampere at each joint, from the drive's gain."""
+    return [] if guess.currents is None else _constants(guess, guess.currents)
+
+
+def _constants(guess: RobotGuess, found: GuessedCurrents) -> list[str]:
+    lines = []
+    for joint, value, lost in zip(guess.roles.joints, found.per_ampere, found.lost, strict=True):
+        unit = of_slide("N m/A") if joint in guess.slides else "N m/A"
+        spread = number((LOST_SPREAD if lost else SPREAD) * value)
+        text = f"{NAME}.torque_per_ampere_{joint}: {{value: {number(value, 5)}, unit: {unit}, prior_sigma: {spread}}}"
+        why = f"{GUESS}: ratios only; the data sheet knows it: gear ratio times k_t"
+        lines.append(line(text, why, indent=2) if lost else f"  {text}")
+    return lines
