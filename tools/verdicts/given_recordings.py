@@ -35,7 +35,8 @@ def given(result: CalibrationResult) -> list[tuple[str, str]]:
         name, sentence = ("Nothing pushes", _push) if changed.push else ("One load throughout", _two_loads)
         found.append((name, sentence(changed, result)))
     if result.torque_readings:
-        found.append(("Torque sensors as the robot file has them", _readings(result)))
+        sensors = "Measured currents" if all(one.unit == "A" for one in result.torque_readings) else "Torque sensors"
+        found.append((f"{sensors} as the robot file has them", _readings(result)))
     if rare := rare_samples(result):
         found.append(("Samples often enough", rare))
     return found
@@ -48,11 +49,12 @@ def odd_trackers(result: CalibrationResult) -> str:
 
 
 def _readings(result: CalibrationResult) -> str:
-    """A sentence on scales and offsets of torque sensors that the robot file lacks, with the lines to add."""
+    """A sentence on scales and offsets of sensors that the robot file lacks, with the lines to add."""
     told = result.torque_readings[:MOST_READINGS]
+    units = ["" if one.unit == "1" else f" {one.unit}" for one in told]
     listed = ", ".join(
-        f"{one.parameter} {significant(one.value)} ± {significant(one.sigma, 1)}{'' if one.unit == '1' else ' N m'}"
-        for one in told
+        f"{one.parameter} {significant(one.value)} ± {significant(one.sigma, 1)}{unit}"
+        for one, unit in zip(told, units, strict=True)
     )
     more = len(result.torque_readings) - len(told)
     lines = " ".join(

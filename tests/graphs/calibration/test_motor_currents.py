@@ -27,6 +27,7 @@ from jointscope.robots.model.readings_at_one_state import ReadingsAtOneState
 from jointscope.robots.parts.motor_current import MotorCurrent
 from jointscope.robots.parts.parameter import Parameter
 from jointscope.tools.bags.read_recording import read_recording
+from jointscope.tools.verdicts.currents_and_volts import NAME
 from jointscope.tools.verdicts.judgement import judge
 
 SIGMA = 0.02  # [A]
@@ -98,7 +99,7 @@ def test_constants_offset_and_all_other_values_are_true(result, made):
 def test_residuals_have_the_size_of_the_noise_and_the_answer_is_good(result):
     for joint in result.robot.joints:
         assert result.channels[f"{joint}.motor_current"].chi2 == pytest.approx(1.0, abs=0.1)
-    check = next(c for c in judge(result).checks if c.name == "Torque from currents and from volts")
+    check = next(c for c in judge(result).checks if c.name == NAME)
     assert check.level == "good" and "joint1 45 %" in check.text, check.text  # 3.0 * 4.696 of 31.328
 
 
@@ -222,8 +223,28 @@ def test_exchanged_currents_a_wrong_sign_and_another_unit_are_named(robot, made)
 def test_more_back_emf_than_damping_is_doubted(result):
     p = replace(result.robot.parameters["motor.k_mi"], value=5.0)
     wrong = replace(result, robot=replace(result.robot, parameters={**result.robot.parameters, p.name: p}))
-    check = next(c for c in judge(wrong).checks if c.name == "Torque from currents and from volts")
+    check = next(c for c in judge(wrong).checks if c.name == NAME)
     assert check.level == "warn" and "joint1 (14.1 of back-EMF, 5.00 N m s/rad of damping)" in check.text
+
+
+def test_an_offset_that_the_file_lacks_is_named(robot, made):
+    plain = replace(robot, parameters={n: p for n, p in robot.parameters.items() if n != "current.offset_joint2"})
+    found = calibrate(plain, [made.recording])
+    (told,) = found.torque_readings
+    assert told.parameter == "current.offset_joint2" and told.unit == "A"
+    assert abs(told.value - 0.1) < 4.0 * told.sigma + 2e-3
+    assert "`current.offset_joint2: {value: 0.0, unit: A, positive: false, prior_sigma: 3}`" in judge(found).answer
+
+
+def test_a_supply_that_is_not_what_the_file_says_is_told_by_the_back_emf(robot, made):
+    wrong = replace(robot, constants={**robot.constants, "motor.supply_voltage": 24.0})
+    own = Parameter("current.back_emf_joint1", 4.0, "A s/rad", 4.0, 4.0)
+    others = [replace(own, name=own.name.replace("1", k)) for k in "23"]
+    wrong = replace(wrong, parameters={**wrong.parameters, **{p.name: p for p in (own, *others)}})
+    check = next(c for c in judge(calibrate(wrong, [made.recording])).checks if c.name == NAME)
+    volts = robot.constants["motor.supply_voltage"] / 24.0
+    assert check.level == "warn" and f"One volt of the command is {volts:.2f}" in check.text, check.text
+    assert "motor.supply_voltage is off by that" in check.text
 
 
 SENSOR = """

@@ -11,6 +11,7 @@ from jointscope.tools.init.text.robot_line import GUESS, as_list, line, number
 from jointscope.tools.init.text.source_text import source_lines
 
 NAME = "motor_current"
+OFFSETS = 5.0  # times an offset, or the noise, that its prior is wide
 SMALLEST = 1e-6  # [A] sigma below which nothing was to be seen
 
 
@@ -38,16 +39,22 @@ def current_lines(guess: RobotGuess) -> list[str]:
 
 
 def current_parameters(guess: RobotGuess) -> list[str]:
-    """Torque of one ampere at each joint, from the drive's gain."""
+    """Torque of one ampere at each joint, from the drive's gain, and the back-EMF; nobody knows the supply yet."""
     return [] if guess.currents is None else _constants(guess, guess.currents)
 
 
 def _constants(guess: RobotGuess, found: GuessedCurrents) -> list[str]:
-    lines = []
-    for joint, value, lost in zip(guess.roles.joints, found.per_ampere, found.lost, strict=True):
-        unit = of_slide("N m/A") if joint in guess.slides else "N m/A"
+    lines, parts = [], zip(found.per_ampere, found.back_emf, found.offset, found.noise, found.lost, strict=True)
+    for joint, (value, back_emf, offset, noise, lost) in zip(guess.roles.joints, parts, strict=True):
+        unit, of_speed = (of_slide(u) if joint in guess.slides else u for u in ("N m/A", "A s/rad"))
         spread = number((LOST_SPREAD if lost else SPREAD) * value)
         text = f"{NAME}.torque_per_ampere_{joint}: {{value: {number(value, 5)}, unit: {unit}, prior_sigma: {spread}}}"
         why = f"{GUESS}: ratios only; the data sheet knows it: gear ratio times k_t"
         lines.append(line(text, why, indent=2) if lost else f"  {text}")
+        spread = number(SPREAD * back_emf)
+        text = f"{NAME}.back_emf_{joint}: {{value: {number(back_emf, 5)}, unit: {of_speed}, prior_sigma: {spread}}}"
+        lines.append(line(text, "k_pwm where volts are volts: without this line it is held to that", indent=2))
+        spread = number(max(OFFSETS * abs(offset), OFFSETS * noise.sigma, SMALLEST))
+        value_of = f"{{value: {number(offset, 5)}, unit: A, positive: false, prior: 0.0, prior_sigma: {spread}}}"
+        lines.append(f"  {NAME}.offset_{joint}: {value_of}")
     return lines
