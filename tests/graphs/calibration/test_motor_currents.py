@@ -2,6 +2,7 @@
 """Measured currents beside commands: MuJoCo's actuators wound to a data sheet, and a BioRob made elsewhere."""
 
 import json
+import re
 from dataclasses import replace
 from pathlib import Path
 
@@ -37,6 +38,16 @@ TRUE = {
     "current.torque_per_ampere_joint3": 1.5,
     "current.offset_joint2": 0.1,
 }
+SENSOR = """
+  current:
+    kind: motor_current
+    topic: /currents
+    type: sensor_msgs/msg/JointState
+    field: effort
+    unit: mA
+    sigma: [0.02, 0.03, 0.04]
+    delay: {value: 0.003}
+"""
 DATA = Path(__file__).resolve().parents[4] / "shared" / "data" / "biorob" / "clean"
 
 
@@ -65,8 +76,9 @@ def simulated(robot, delay=0.0, seconds=2.0, effects=(), **conditions):
     from jointscope.tools.simulator import simulate
 
     there = robot.with_sensors({"current": replace(robot.motor_current, delay=delay)})
+    known = {name: value for name, value in TRUE.items() if name in robot.parameters}
     made = simulate(
-        there, "calibration", seconds, seed=3, friction="smooth", parameters=TRUE, effects=effects, **conditions
+        there, "calibration", seconds, seed=3, friction="smooth", parameters=known, effects=effects, **conditions
     )
     return made
 
@@ -227,6 +239,23 @@ def test_more_back_emf_than_damping_is_doubted(result):
     assert check.level == "warn" and "joint1 (14.1 of back-EMF, 5.00 N m s/rad of damping)" in check.text
 
 
+def test_a_drive_that_takes_amperes_has_no_back_emf_and_its_delay_stays_in_the_middle_of_a_gap(tmp_path):
+    text = load_robot("doggy").path.read_text().replace("unit: duty", "unit: A")
+    text = re.sub(r"  motor\.k_pwm:.*", "  motor.torque_constant: {value: 30.0, unit: N m/A, prior_sigma: 50.0}", text)
+    text = re.sub(r"  motor\.k_mi:.*", "", text).replace("urdf: doggy.urdf", "urdf: ready:doggy/doggy.urdf")
+    plain = SENSOR.replace("mA", "A").replace("    delay: {value: 0.003}\n", "").replace("[0.02, 0.03, 0.04]", "0.002")
+    path = tmp_path / "robot.yaml"
+    path.write_text(text.replace("\nsensors:", "\nsensors:" + plain.rstrip(), 1))
+    robot = load_robot(path)  # without a constant of its own: the ampere that is measured is that of the command
+    late = simulated(robot, 0.0024, seconds=3.0)
+    found = calibrate(robot, [late.recording])
+    is_true(found, late)
+    assert found.robot.motor_current.delay == pytest.approx(0.0025, abs=1e-5)
+    assert found.robot.motor_current.delay_sigma == pytest.approx(1e-3 / np.sqrt(12.0), rel=0.01)
+    assert found.channels["joint1.motor_current"].chi2 == pytest.approx(1.0, abs=0.1)
+    assert not any(check.name == NAME for check in judge(found).checks)
+
+
 def test_an_offset_that_the_file_lacks_is_named(robot, made):
     plain = replace(robot, parameters={n: p for n, p in robot.parameters.items() if n != "current.offset_joint2"})
     found = calibrate(plain, [made.recording])
@@ -245,18 +274,6 @@ def test_a_supply_that_is_not_what_the_file_says_is_told_by_the_back_emf(robot, 
     volts = robot.constants["motor.supply_voltage"] / 24.0
     assert check.level == "warn" and f"One volt of the command is {volts:.2f}" in check.text, check.text
     assert "motor.supply_voltage is off by that" in check.text
-
-
-SENSOR = """
-  current:
-    kind: motor_current
-    topic: /currents
-    type: sensor_msgs/msg/JointState
-    field: effort
-    unit: mA
-    sigma: [0.02, 0.03, 0.04]
-    delay: {value: 0.003}
-"""
 
 
 def written(tmp_path, sensor=SENSOR, parameters=None, robot="doggy"):
