@@ -274,7 +274,7 @@ def _refit_leaders(
     """
     worth = [c for c in scored.candidates if worth_a_refit(c, scored.placebo)][: PATIENCE * leaders]
     found, errors, enough = dict[str, ValidatedRefit | Missed | None](), list[float](), 0.0
-    left_out = LeftOut.of(base, spans[1]) if worth else None
+    left_out = LeftOut.of(base, spans) if worth else None
     refits = side_by_side.in_order(refit_if_it_helps, (base, *spans, left_out, holdout), [c.best for c in worth])
     for i, candidate in enumerate(worth):
         helped = any(after**2 < (1.0 - MATTERS) * error**2 for after in errors)

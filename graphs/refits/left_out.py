@@ -18,7 +18,7 @@ from jointscope.factors.calibration import Calibration
 from jointscope.graphs.calibration.base_model import BaseModel, Span
 from jointscope.graphs.problem.known_values import with_known_values
 from jointscope.graphs.refits.loop_validation import judged_by_loop
-from jointscope.graphs.refits.refit import ENOUGH, BegunRefit, easy_noise, pieces_of
+from jointscope.graphs.refits.refit import ENOUGH, BegunRefit, pieces_of
 from jointscope.graphs.solving.batch_solver import solve
 from jointscope.graphs.solving.estimate import Estimate
 from jointscope.robots.errors import JointscopeError
@@ -48,7 +48,7 @@ class LeftOut:
     Attributes:
         base: the base model.
         spans: the pieces.
-        cost: of their readings with the base model; infinite where its states do not come to rest.
+        cost: of their readings with the base model, fitted to the same pieces as refits.
     """
 
     base: BaseModel
@@ -56,13 +56,26 @@ class LeftOut:
     cost: float
 
     @staticmethod
-    def of(base: BaseModel, spans: Sequence[Span]) -> LeftOut | None:
-        """The pieces with what the base model makes of them; None where refits are fitted to everything."""
+    def of(base: BaseModel, spans: tuple[Sequence[Span], Sequence[Span]]) -> LeftOut | None:
+        """Pieces that are left out of a fit of others, with what the base model makes of them, fitted to those, too.
+
+        What a fit to short pieces loses elsewhere is no fault of an effect.
+
+        Args:
+            base: the base model.
+            spans: pieces on which refits are fitted, and those that they leave out.
+
+        Returns:
+            None where refits are fitted to everything.
+        """
         if judged_by_loop(base.robot, base.recordings):
             return None
-        known = LeftOut(base, tuple(spans), np.inf)
-        cost = known._cost_with(replace(base.robot, noise=easy_noise(base.robot)), base.calibrations[0])
-        return replace(known, cost=np.inf if cost is None else cost)
+        known = LeftOut(base, tuple(spans[1]), 1.0)
+        try:
+            cost = known.times(BegunRefit.of(base, spans[0], None))
+        except (JointscopeError, np.linalg.LinAlgError):
+            return None
+        return replace(known, cost=cost) if cost > 0.0 else None
 
     def times(self, begun: BegunRefit) -> float:
         """The cost with the values of a refit, over that without its effect; 0 where its states do not come to rest."""

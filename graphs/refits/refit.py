@@ -95,7 +95,7 @@ class BegunRefit:
         elif label and not robot.has_effect(*label.split("@")):
             robot = add_effect(robot, label)
         # noise that is next to nothing holds the states where the model without the effect has them
-        noise = easy_noise(robot)
+        noise = not_below(robot.noise, EASY) if robot.noise.estimate else robot.noise
         problems, estimate = pieces_of(base, replace(robot, noise=noise), spans)
         if robot is not base.robot:
             # the states still are those of a model without the effect: they follow before all parameters move
@@ -147,11 +147,6 @@ def refit(base: BaseModel, spans: Sequence[Span], score: HypothesisScore | None,
         SolveError: the fit ran away.
     """
     return BegunRefit.of(base, spans, score, label).finished()
-
-
-def easy_noise(robot: Robot) -> ProcessNoise:
-    """The robot's noise, not so small that states stay where another model has them."""
-    return not_below(robot.noise, EASY) if robot.noise.estimate else robot.noise
 
 
 def _followed(problems: Sequence[BagProblem], start: Estimate) -> Estimate:
