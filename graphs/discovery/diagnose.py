@@ -35,9 +35,9 @@ from jointscope.graphs.discovery.verdicts import (
     with_best_held_out,
     worth_a_refit,
 )
-from jointscope.graphs.refits.validated_refit import ValidatedRefit, judged_seconds, refit_and_validate
+from jointscope.graphs.refits.left_out import LeftOut, Missed
+from jointscope.graphs.refits.validated_refit import ValidatedRefit, judged_seconds, refit_if_it_helps
 from jointscope.graphs.refits.validation import ValidationError, fit_and_judge, judged_error
-from jointscope.graphs.scoring.hypothesis_score import HypothesisScore
 from jointscope.graphs.screening.screen_all import PLAIN_MISTAKES, screen_all
 from jointscope.graphs.solving.batch_solver import Progress
 from jointscope.graphs.solving.solver_context import in_solver_context
@@ -247,10 +247,13 @@ def _by_predictions(
     """Candidates judged by predictions after their refits, best first, and the robots refitted."""
     base, before, spans = trials.base, trials.before, trials.spans
     holdout, seconds = trials.holdout if each_held_out else None, judged_seconds(base, spans[1])
-    validated, failed = _refit_leaders(base, scored, before.error, spans, holdout, leaders, report, side_by_side)
-    judged = [judge(c, before, validated.get(c.label), seconds, c.label in failed) for c in scored.candidates]
+    tried = _refit_leaders(base, scored, before.error, spans, holdout, leaders, report, side_by_side)
+    judged = [
+        judge(c, before, tried.get(c.label), seconds, failed=tried.get(c.label, ()) is None) for c in scored.candidates
+    ]
     slowest = slowest_seen(base.robot, base.recordings[0], base.states[0])
-    judged, refits = ranked([standing_in(c, slowest) for c in judged]), {n: t.refit.robot for n, t in validated.items()}
+    judged = ranked([standing_in(c, slowest) for c in judged])
+    refits = {name: found.refit.robot for name, found in tried.items() if isinstance(found, ValidatedRefit)}
     return judged if each_held_out else with_best_held_out(judged, refits, trials.holdout), refits
 
 
@@ -263,38 +266,25 @@ def _refit_leaders(
     leaders: int,
     report: Progress,
     side_by_side: SideBySide,
-) -> tuple[dict[str, ValidatedRefit], set[str]]:
-    """Refits of the best candidates, and the labels of those whose fit ran away.
+) -> dict[str, ValidatedRefit | Missed | None]:
+    """Refits of the best candidates by label; None for those that ran away.
 
     Once one explains nearly all of the excess, only those whose score comes near its own are refitted, too; where none
     helps, the next ones are.
     """
     worth = [c for c in scored.candidates if worth_a_refit(c, scored.placebo)][: PATIENCE * leaders]
-    found, failed, enough = dict[str, ValidatedRefit](), set[str](), 0.0
-    refits = side_by_side.in_order(_refit_and_validate, (base, *spans, holdout), [c.best for c in worth])
+    found, errors, enough = dict[str, ValidatedRefit | Missed | None](), list[float](), 0.0
+    left_out = LeftOut.of(base, spans) if worth else None
+    refits = side_by_side.in_order(refit_if_it_helps, (base, *spans, left_out, holdout), [c.best for c in worth])
     for i, candidate in enumerate(worth):
-        helped = any(t.validation.error**2 < (1.0 - MATTERS) * error**2 for t in found.values())
+        helped = any(after**2 < (1.0 - MATTERS) * error**2 for after in errors)
         if candidate.plausible < enough or (i >= leaders and helped):
             break
         report(f"refitting {candidate.label}", 0.5 + 0.5 * min(i / leaders, 1.0))
-        validated = next(refits)
-        if validated is None:
-            failed.add(candidate.label)
-            continue
-        found[candidate.label] = validated
-        if excess_share(error, validated.validation.error, SENSOR_FLOOR) > NEARLY_ALL:
-            enough = max(enough, NEAR * candidate.plausible)
+        validated = found[candidate.label] = next(refits)
+        if isinstance(validated, ValidatedRefit):
+            errors.append(validated.validation.error)
+            if excess_share(error, errors[-1], SENSOR_FLOOR) > NEARLY_ALL:
+                enough = max(enough, NEAR * candidate.plausible)
     refits.close()
-    return found, failed
-
-
-@in_solver_context
-def _refit_and_validate(
-    shared: tuple[BaseModel, Sequence[Span], Sequence[Span], Recording | None], score: HypothesisScore
-) -> ValidatedRefit | None:
-    """A refit on the pieces to fit, judged on those between; None where it ran away."""
-    base, fit, spans, holdout = shared
-    try:
-        return refit_and_validate(base, (fit, spans), score, holdout=holdout)
-    except (JointscopeError, np.linalg.LinAlgError):
-        return None
+    return found

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from jointscope.graphs.discovery.diagnosis_result import Candidate, EffectEstimate
 from jointscope.graphs.discovery.scored_candidates import SIGNIFICANT, ScoredCandidate
+from jointscope.graphs.refits.left_out import Missed
 from jointscope.graphs.refits.validated_refit import ValidatedRefit
 from jointscope.graphs.refits.validation import ValidationError, reported_heldout_error
 from jointscope.robots.effect_kinds.effect import Effect, EffectParameter
@@ -36,7 +37,7 @@ SAME = 0.02  # relative difference of errors that decides nothing
 def judge(
     scored: ScoredCandidate,
     base: ValidationError,
-    validated: ValidatedRefit | None,
+    validated: ValidatedRefit | Missed | None,
     seconds: float,
     failed: bool = False,
 ) -> Candidate:
@@ -45,17 +46,17 @@ def judge(
     Args:
         scored: its score.
         base: errors of the base model on validation blocks.
-        validated: its refit; None if it was not worth one.
+        validated: its refit, or that it was given up; None if it was not worth one.
         seconds: of all validation blocks.
         failed: whether its refit ran away.
     """
     here, sizes = scored.best.hypothesis.here, scored.best.hypothesis.sizes
-    if validated is None:
+    if not isinstance(validated, ValidatedRefit):
         parameters = {
             size.name: EffectEstimate(float(value), float(sigma), size.unit)
             for size, value, sigma in zip(sizes, scored.best.estimate, scored.best.sigma, strict=True)
         }
-        verdict, reasons = _without_refit(scored, failed)
+        verdict, reasons = _without_refit(scored, failed) if validated is None else _after_giving_up(validated)
         return _candidate(scored, parameters, verdict, reasons)
     robot, refit = validated.refit.robot, validated.refit
     parameters = {
@@ -120,6 +121,16 @@ def _without_refit(scored: ScoredCandidate, failed: bool) -> tuple[str, tuple[st
     if not scored.right_sign:
         return "absent", ("the data want the impossible sign",)
     return "absent", ("it would explain no more than chance",)
+
+
+def _after_giving_up(missed: Missed) -> tuple[str, tuple[str, ...]]:
+    """Of a candidate that makes what its fit leaves out far less likely."""
+    reason = (
+        f"fitted to pieces of the recordings, it misses those between {missed.times:.2g} times as far as without it"
+    )
+    if missed.converged:
+        return "absent", (reason,)
+    return "possible", (f"{reason}; its refit did not converge: calibrate a robot with it to see",)
 
 
 def _worth_seeing(effect: Effect, size: EffectParameter) -> float:

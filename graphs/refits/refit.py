@@ -20,7 +20,7 @@ from jointscope.graphs.problem.bag_problem import BagProblem
 from jointscope.graphs.problem.known_values import carried, with_known_values
 from jointscope.graphs.scoring.columns.gap import BEYOND, curves_of, tried_gap
 from jointscope.graphs.scoring.hypothesis_score import HypothesisScore
-from jointscope.graphs.solving.batch_solver import solve
+from jointscope.graphs.solving.batch_solver import Solution, solve
 from jointscope.graphs.solving.estimate import Estimate
 from jointscope.graphs.solving.posterior import posteriors
 from jointscope.robots.dynamics.transmission import Transmission
@@ -31,6 +31,7 @@ from jointscope.robots.effect_kinds.time_shift import TimeShift
 from jointscope.robots.files.effect_editing import add_effect
 from jointscope.robots.model.encoder_plays import unlagged
 from jointscope.robots.model.robot import Robot
+from jointscope.robots.parts.process_noise import ProcessNoise
 from jointscope.robots.parts.sensors import Sensor
 from jointscope.robots.recordings.recording import Recording
 
@@ -63,6 +64,76 @@ class Refit:
     converged: bool
 
 
+@dataclass(frozen=True)
+class BegunRefit:
+    """A refit whose values have been fitted at the noise of the base model; half of the work is still to come.
+
+    Attributes:
+        base: the base model.
+        spans: pieces that are fitted.
+        robot: with the effect, where it began.
+        label: ID@OWNER of the effect; empty for the base model itself.
+        noise: with which they were fitted.
+        problems: the pieces.
+        solution: of these.
+    """
+
+    base: BaseModel
+    spans: tuple[Span, ...]
+    robot: Robot
+    label: str
+    noise: ProcessNoise
+    problems: tuple[BagProblem, ...]
+    solution: Solution
+
+    @staticmethod
+    def of(base: BaseModel, spans: Sequence[Span], score: HypothesisScore | None, label: str = "") -> BegunRefit:
+        """Arguments and errors as of `refit`."""
+        robot = base.robot
+        if score is not None:
+            robot = with_hidden_gap(add_effect(robot, score.hypothesis.label, start_of(score, robot)), base, score)
+        elif label and not robot.has_effect(*label.split("@")):
+            robot = add_effect(robot, label)
+        # noise that is next to nothing holds the states where the model without the effect has them
+        noise = not_below(robot.noise, EASY) if robot.noise.estimate else robot.noise
+        problems, estimate = pieces_of(base, replace(robot, noise=noise), spans)
+        if robot is not base.robot:
+            # the states still are those of a model without the effect: they follow before all parameters move
+            estimate = _followed(problems, estimate)
+        solution = solve(problems, estimate, max_iterations=FIRST_ITERATIONS, step_tolerance=ENOUGH)
+        name = score.hypothesis.label if score is not None else label
+        return BegunRefit(base, tuple(spans), robot, name, noise, tuple(problems), solution)
+
+    def further(self) -> BegunRefit:
+        """As many iterations again."""
+        start = self.solution.estimate
+        found = solve(self.problems, start, max_iterations=FIRST_ITERATIONS, step_tolerance=ENOUGH)
+        return replace(self, solution=found)
+
+    def finished(self) -> Refit:
+        """With the noise that the effect leaves; errors as of `refit`."""
+        problems, estimate = _with_short_impacts(self.problems, self.solution.estimate)
+        robot, noise = self.robot, self.noise
+        if noise.estimate:
+            noise, estimate = estimate_noise(problems, estimate, cycles=NOISE_CYCLES)
+        if any(isinstance(here.effect, TimeShift) for here in robot.effects):
+            moved = _with(robot, estimate.calibrations[0])
+            problems = [p.of_robot(moved) for p in problems]
+        problems = [problem.with_noise(noise) for problem in problems]
+        solution = solve(problems, estimate, max_iterations=LAST_ITERATIONS, step_tolerance=ENOUGH)
+        found = solution.estimate.calibrations[0]
+        _, covariance = posteriors(problems, solution)
+        sigma = np.sqrt(np.diag(covariance))[: len(found.names)] * found.value_by_coordinate
+        own = {
+            full.rsplit(".", 1)[1]: float(value)
+            for full, value in zip(found.names, sigma, strict=True)
+            if self.label and full.startswith("{1}.{0}.".format(*self.label.split("@")))
+        }
+        robot = replace(_with(robot, found), noise=noise)
+        biases = _biases(self.base, self.spans, solution.estimate.calibrations)
+        return Refit(robot, self.label, biases, own, solution.converged)
+
+
 def refit(base: BaseModel, spans: Sequence[Span], score: HypothesisScore | None, label: str = "") -> Refit:
     """Fits the base model plus one effect.
 
@@ -75,37 +146,7 @@ def refit(base: BaseModel, spans: Sequence[Span], score: HypothesisScore | None,
     Raises:
         SolveError: the fit ran away.
     """
-    robot = base.robot
-    if score is not None:
-        robot = with_hidden_gap(add_effect(robot, score.hypothesis.label, start_of(score, robot)), base, score)
-    elif label and not robot.has_effect(*label.split("@")):
-        robot = add_effect(robot, label)
-    # noise that is next to nothing holds the states where the model without the effect has them
-    noise = not_below(robot.noise, EASY) if robot.noise.estimate else robot.noise
-    problems, estimate = _pieces(base, replace(robot, noise=noise), spans)
-    if robot is not base.robot:
-        # the states still are those of a model without the effect: they follow before all parameters move
-        estimate = _followed(problems, estimate)
-    solution = solve(problems, estimate, max_iterations=FIRST_ITERATIONS, step_tolerance=ENOUGH)
-    problems, estimate = _with_short_impacts(problems, solution.estimate)
-    if noise.estimate:
-        noise, estimate = estimate_noise(problems, estimate, cycles=NOISE_CYCLES)
-    if any(isinstance(here.effect, TimeShift) for here in robot.effects):
-        moved = _with(robot, estimate.calibrations[0])
-        problems = [p.of_robot(moved) for p in problems]
-    problems = [problem.with_noise(noise) for problem in problems]
-    solution = solve(problems, estimate, max_iterations=LAST_ITERATIONS, step_tolerance=ENOUGH)
-    found = solution.estimate.calibrations[0]
-    _, covariance = posteriors(problems, solution)
-    sigma = np.sqrt(np.diag(covariance))[: len(found.names)] * found.value_by_coordinate
-    name = score.hypothesis.label if score is not None else label
-    own = {
-        full.rsplit(".", 1)[1]: float(value)
-        for full, value in zip(found.names, sigma, strict=True)
-        if name and full.startswith("{1}.{0}.".format(*name.split("@")))
-    }
-    robot = replace(_with(robot, found), noise=noise)
-    return Refit(robot, name, _biases(base, spans, solution.estimate.calibrations), own, solution.converged)
+    return BegunRefit.of(base, spans, score, label).finished()
 
 
 def _followed(problems: Sequence[BagProblem], start: Estimate) -> Estimate:
@@ -153,7 +194,7 @@ def _bearing_start(score: HypothesisScore, robot: Robot) -> dict[str, float]:
     return start
 
 
-def _pieces(base: BaseModel, robot: Robot, spans: Sequence[Span]) -> tuple[list[BagProblem], Estimate]:
+def pieces_of(base: BaseModel, robot: Robot, spans: Sequence[Span]) -> tuple[list[BagProblem], Estimate]:
     """The pieces as problems of the new robot, with the base model's states."""
     problems, states, calibrations = [], [], []
     for span in spans:

@@ -153,11 +153,31 @@ def parts_of(problem: BagProblem, length: int) -> Iterator[tuple[int, int, BagPr
 
 def cost(problem: BagProblem, x: Array, calibration: Calibration) -> float:
     """Half the sum of squared whitened residuals."""
-    total = float(np.sum((problem.dynamics.residual((x[:-1], x[1:]), calibration) / problem.dynamics.sigmas) ** 2))
+    alone = [placed.factor for placed in problem.placed if placed.factor.states == 0]
+    squares = (np.sum((factor.residual((), calibration) / factor.sigmas) ** 2) for factor in alone)
+    return float(np.sum(costs(problem, x, calibration))) + 0.5 * float(sum(squares))
+
+
+def costs(problem: BagProblem, x: Array, calibration: Calibration) -> Array:
+    """The share of each tick in the cost, as `NormalEquations.costs`, shape (m,).
+
+    Without derivatives, that takes a sixth of the time of normal equations.
+    """
+    steps = problem.dynamics
+    found = np.zeros(len(x))
+    found[:-1] = _squares(steps.residual((x[:-1], x[1:]), calibration), steps.sigmas)
     for placed in problem.placed:
-        residual = placed.factor.residual(states_of(placed.factor, placed.ticks, x), calibration)
-        total += float(np.sum((residual / placed.factor.sigmas) ** 2))
-    return 0.5 * total
+        factor, ticks = placed.factor, placed.ticks
+        if factor.states:
+            squares = _squares(factor.residual(states_of(factor, ticks, x), calibration), factor.sigmas)
+            found += np.bincount(ticks, squares, len(x))
+    return found
+
+
+def _squares(residual: Array, sigmas: Array) -> Array:
+    """Half the squared whitened residual of each sample, shape (m,)."""
+    whitened = residual / sigmas
+    return 0.5 * np.einsum("kr,kr->k", whitened, whitened)
 
 
 def chunks(placed: Placed) -> Iterable[tuple[Factor, NDArray[np.intp]]]:

@@ -12,13 +12,14 @@ from numpy.typing import NDArray
 
 from jointscope.factors.calibration import Calibration
 from jointscope.graphs.problem.bag_problem import BagProblem
-from jointscope.graphs.solving.inner_states import LinearisedStretch
-from jointscope.graphs.solving.normal_equations import parts_of
+from jointscope.graphs.solving.inner_states import LinearisedStretch, Point
+from jointscope.graphs.solving.normal_equations import costs, parts_of
 from jointscope.graphs.solving.solver_context import side_by_side
 
 Array = NDArray[np.float64]
 
 LONG = 20_000  # states of a recording from which memory is what is scarce
+DOUBTS = 2  # linearisations after a rejected step before which a trial may be the next one that is rejected
 AT_REST = 1e-9  # share of the cost, less than which inner states gain no more
 
 
@@ -85,6 +86,8 @@ class RecordingStretch:
 
     Inner states follow from where the stretch was linearised last; after that this linearisation is not needed unless
     the step is rejected. So a trial may take its memory until a first one is rejected, from when on both are kept.
+    A trial that is accepted is where the stretch is linearised next, so it is linearised at once; where the last ones
+    were rejected, only its cost is worked out, which says soon enough whether it is the place to go on from.
 
     Args:
         problem: the factors of these samples alone, ticks counted from the first.
@@ -117,6 +120,7 @@ class RecordingStretch:
         self._kept = [self._room()]
         self._base = self._trial = self._kept[0].move(x.copy(), calibration, self.damping)
         self._damped_with, self._begin, self._inner_steps = self.damping, self._base, 0
+        self._doubts = 0  # linearisations to come before which only the cost of a trial is worked out
 
     @property
     def ticks(self) -> tuple[int, ...]:
@@ -164,16 +168,24 @@ class RecordingStretch:
         """Evaluates everything at new ends and shared values; returns the cost there."""
         first, last = ends
         if self._base.is_at(first, last, calibration):
+            if self._trial is not self._base:  # it was rejected
+                self._doubts = DOUBTS
             self._trial = self._base
         elif not self._trial.is_at(first, last, calibration):
             if self._inner_steps:
                 self._base, self._damped_with = self._begin, np.zeros(len(self.damping))
             self._trial = self._base
             if not self._base.is_at(first, last, calibration):
-                x = self._following(first, last, calibration)
-                self._trial = self._free_room().move(x, calibration, self.damping)
+                self._trial = self._tried(self._following(first, last, calibration), calibration)
                 self._go_inside(first, last, calibration)
         return self._trial.cost
+
+    def _tried(self, x: Array, calibration: Calibration) -> Point:
+        """A place to go to, linearised if it is likely to be the next one."""
+        if not self._doubts or self._inner_steps:
+            return self._free_room().move(x, calibration, self.damping)
+        by_tick = costs(self.problem, x, calibration)
+        return Point(x, calibration, float(np.sum(by_tick)), by_tick)
 
     def _go_inside(self, first: Array, last: Array, calibration: Calibration) -> None:
         """Takes the inner states to their minimum, while the ends stay."""
@@ -191,6 +203,8 @@ class RecordingStretch:
 
     def settle(self) -> tuple[Array, Array, float]:
         """Makes the visited point the linearisation point: H, shape (n, n), g, shape (n,), and the cost left."""
+        if self._trial is not self._base:
+            self._doubts = max(self._doubts - 1, 0)
         self._base, self._damped_with = self._trial, self.damping
         found = self._linearised().inner
         return found.H, found.g, self._base.cost - found.gain

@@ -12,6 +12,7 @@ from jointscope.graphs.discovery.diagnosis_result import Candidate, EffectEstima
 from jointscope.graphs.discovery.diagnosis_words import part_in_words
 from jointscope.graphs.discovery.scored_candidates import ScoredCandidate
 from jointscope.graphs.discovery.verdicts import excess_share, judge, standing_in, worth_a_refit
+from jointscope.graphs.refits.left_out import Missed
 from jointscope.graphs.refits.validated_refit import ValidatedRefit
 from jointscope.graphs.refits.validation import ValidationError
 from jointscope.graphs.scoring.columns.hypotheses import EffectHypothesis
@@ -209,3 +210,11 @@ def test_friction_that_falls_only_where_samples_see_nothing_is_a_stand_in(veloci
     found = standing_in(candidate, {"joint2": 0.016})
     assert found.verdict == verdict
     assert any("holds the joint until it breaks away" in reason for reason in found.reasons) == (verdict == "stand_in")
+
+
+def test_a_refit_that_was_given_up_says_why_and_is_not_missing():
+    reason = "fitted to pieces of the recordings, it misses those between 1.9 times as far as without it"
+    assert verdict(scored(), Missed(1.87, converged=True)) == ("absent", (reason,))
+    unsure = f"{reason}; its refit did not converge: calibrate a robot with it to see"
+    assert verdict(scored(), Missed(1.87, converged=False)) == ("possible", (unsure,))
+    assert not judge(scored(), BASE, Missed(1.87, True), SECONDS).refitted
