@@ -192,8 +192,9 @@ def said_by_arm(candidates: Sequence[ArmCandidate], kinds: Sequence[str]) -> dic
     found: dict[str, dict[str, Said]] = {kind: {} for kind in kinds}
     for c in candidates:
         unit = "rad/(N m)" if c.hypothesis.kind.soft else c.hypothesis.kind.unit
-        pairs = zip(c.hypothesis.names, c.sizes, c.sigmas, strict=True)
-        sizes = {_last_part(name, c.hypothesis.kind.soft): (value, sigma, unit) for name, value, sigma in pairs}
+        pairs = zip(c.hypothesis.catalogue_names, c.sizes, c.sigmas, strict=True)
+        soft, factor = c.hypothesis.kind.soft, c.hypothesis.kind.catalogue[1]
+        sizes = {_last_part(name, soft): (factor * value, sigma, unit) for name, value, sigma in pairs}
         evidence = c.evidence  # of both kinds together: it counts once
         for kind in kinds:
             unseen = c.hypothesis.kind.unseen.get(kind, "")
