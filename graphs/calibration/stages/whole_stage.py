@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from jointscope.factors.calibration import Calibration
 from jointscope.graphs.calibration.stages.convergence_asked import must_converge
 from jointscope.graphs.calibration.stages.history import History
+from jointscope.graphs.calibration.stages.near_solution import NearSolution
 from jointscope.graphs.calibration.stages.solved import Solved
 from jointscope.graphs.calibration.stages.solved_windows import anchored, noise_windows
 from jointscope.graphs.noise.noise_estimation import FixedPoint, densities, not_below, scaled
@@ -66,6 +67,7 @@ class WholeStage:
         sets: recordings of other kinds, which share the values of the motions from here on.
         stated: sigmas of encoders before any was found anew, by sensor, shape (n,) each; those at hand where empty.
         agrees: relative difference of noise and residuals that asks for no further pass.
+        near: a point near the solution; None where states come from the measurements.
     """
 
     hold: tuple[str, ...]
@@ -76,6 +78,7 @@ class WholeStage:
     sets: Sequence[SetProblem] = ()
     stated: Mapping[str, Array] = field(default_factory=dict)
     agrees: float = NOISE_AGREES
+    near: NearSolution | None = None
 
     def solve(self, problems: Sequence[BagProblem], noise: ProcessNoise, calibrations: Sequence[Calibration]) -> Solved:
         """First with looser noise, then with the estimated one, checked against the whole."""
@@ -84,7 +87,9 @@ class WholeStage:
     def approached(
         self, problems: Sequence[BagProblem], noise: ProcessNoise, calibrations: Sequence[Calibration]
     ) -> Estimate:
-        """Where looser noise and blunter friction lead from the values that windows found."""
+        """Where looser noise and blunter friction lead from the values that windows found; near states are kept."""
+        if self.near is not None and (states := self.near.states_of(problems)):
+            return self.with_sets(Estimate(tuple(states), tuple(calibrations)))
         blunt = blunt_sharpness(problems[0].robot, [p.recording for p in problems])
         softer = [anchored([blunted(p, sharpness) for p in problems], calibrations) for sharpness in blunt]
         estimate = approach(softer[0] if softer else problems, noise, calibrations, self.hold)
@@ -114,7 +119,8 @@ class WholeStage:
     def from_both_sides(self, above: Solved) -> Solved:
         """A solution, or a better one with less noise, where encoders do not show how joints turn over."""
         blunt = blunt_sharpness(above.robot, [p.recording for p in above.problems])
-        return self._from_below(above) if blunt and above.robot.noise.estimate else above
+        asked = above.robot.noise.estimate and not self._once
+        return self._from_below(above) if blunt and asked else above
 
     def with_memory(self, white: Solved) -> Solved:
         """The solution with random torques that last, where the recordings ask for them; else the one that is given."""
@@ -158,7 +164,7 @@ class WholeStage:
             # states that a large process noise lets follow the samples leave less of their noise than there is
             follow = bool(np.any(change < -NOISE_AGREES))
             other = _with_sigmas(problems, solved, self.stated) if self.sigmas and not follow else None
-            if other is None and np.all(np.abs(change) < self.agrees):
+            if self._once or (other is None and np.all(np.abs(change) < self.agrees)):
                 break
             noise = updates.update(noise, solved.evidence.factors) if noise.estimate else noise
             problems, estimate = other or problems, solution.estimate
@@ -186,6 +192,11 @@ class WholeStage:
         solution = self.solver(now, estimate, max_iterations=most, hold=self.hold, progress=self.progress)
         self.history.add(name, solution)
         return solution
+
+    @property
+    def _once(self) -> bool:
+        """Whether the noise is taken as it is."""
+        return self.near is not None and self.near.once
 
     def _sets_of(self, problems: Sequence[BagProblem]) -> list[SetProblem]:
         """The recordings of other kinds on the robot of the motions."""
