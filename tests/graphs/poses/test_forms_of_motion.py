@@ -9,13 +9,17 @@ from dataclasses import replace
 import numpy as np
 import pinocchio as pin
 import pytest
+from three_axes import geometry_in_doubt, three_axes
 
 from jointscope.graphs.poses.sagging_arm import SaggingArm
 from jointscope.robots.effects.link_mass import change
+from jointscope.robots.files.effect_catalogue import catalogue
+from jointscope.robots.files.effect_editing import add_effect
 from jointscope.robots.files.robot_file import load_robot
 from jointscope.robots.geometry.arm_chain import ArmChain
 from jointscope.robots.geometry.arm_effects import hypotheses
 from jointscope.robots.geometry.flexible_arm import FlexibleArm
+from jointscope.robots.model.structured_tree import StructuredTree
 
 GAP = "joint3.backlash.half_gap"
 LINK = {"joint2.link_mass.mass": 1.5, "joint2.link_mass.x": 0.3, "joint2.link_mass.y": -0.2, "joint2.link_mass.z": 0.4}
@@ -78,3 +82,44 @@ def test_a_gap_that_the_model_has_in_the_form_of_motion_is_not_looked_for_again(
     labels = {h.label for h in hypotheses(robot.joints, known, True)}
     assert "backlash@joint3" in labels
     assert "backlash@joint3" not in {h.label for h in hypotheses(robot.joints, {*known, GAP}, True)}
+
+
+@pytest.fixture(scope="module")
+def three(tmp_path_factory):
+    """An arm that moves, is shaken and is seen at rest."""
+    folder = tmp_path_factory.mktemp("three")
+    three_axes(folder)
+    return geometry_in_doubt(folder)
+
+
+def test_a_load_at_the_target_is_one_mass_for_motion_poses_and_responses(three):
+    loaded = add_effect(three, "payload@robot", {"mass": 2.0})
+    q = Q[:, :3]
+    model, values = StructuredTree(loaded).bodies(loaded.values).model, {**three.values, "robot.payload.mass": 2.0}
+    assert model.inertias[3].mass == pytest.approx(three.tree.model.inertias[3].mass + 2.0)
+    chain = ArmChain(three.tree, three.poses.link, three.poses.at)
+    expected = [-pin.computeGeneralizedGravity(model, model.createData(), each) for each in q]
+    np.testing.assert_allclose(chain.at(q, values).gravity, expected, atol=1e-9)
+    arm = FlexibleArm(three)
+    tree = copy.copy(three.tree)
+    tree.model = model
+    other = FlexibleArm(replace(three, tree=tree)).linearised(q[0], three.values).mean[0]
+    np.testing.assert_allclose(arm.linearised(q[0], values).mean[0], other, rtol=1e-6, atol=1e-6)
+
+
+def test_torques_by_a_load_at_the_target_are_differences(three):
+    loaded = add_effect(three, "payload@robot", {"mass": 2.0})
+    tree, rng = StructuredTree(loaded), np.random.default_rng(5)
+    q, v, a = rng.standard_normal((3, 6, 3))
+    values, name = dict(loaded.values), "robot.payload.mass"
+    bodies = tree.bodies(values)
+    tau = bodies.torque(q, v, a)
+    by = tree.by_parameter(q, v, tau, a, np.linalg.inv(bodies.mass_matrix(q)), values)[name]
+    ends = [tree.bodies({**values, name: 2.0 + step}).acceleration(q, v, tau) for step in (1e-4, -1e-4)]
+    np.testing.assert_allclose(by, (ends[0] - ends[1]) / 2e-4, rtol=1e-5, atol=1e-7)
+
+
+def test_a_robot_without_poses_has_no_load_at_a_target(three):
+    payload = catalogue()["payload"]
+    assert payload.owners_of(three) == ("joint3", "robot")
+    assert payload.owners_of(replace(three, poses=None)) == ("joint3",)
