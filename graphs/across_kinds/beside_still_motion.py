@@ -52,7 +52,9 @@ def calibrate_trial(
     robot, poses, at_rest = standing_still(robot, given, report)
     still: list[SetProblem] = [*at_rest, *own_size(robot, poses), motion.of_robot(robot)]
     common = Calibration.of(robot)
-    summary = calibrate_frequency(robot, given.shaken, report, near=True).summary if given.shaken else None
+    summary = None
+    if given.shaken:
+        summary = calibrate_frequency(robot, given.shaken, report, near=True, complete=False).summary
     if summary is None:
         solution = _solved(still, common)
     else:

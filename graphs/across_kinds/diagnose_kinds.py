@@ -29,8 +29,9 @@ from jointscope.graphs.discovery.diagnosis_result import Diagnosis
 from jointscope.graphs.discovery.side_by_side import solver_of
 from jointscope.graphs.discovery.starting_model import starting_model
 from jointscope.graphs.joint_kinds.arm_candidates import Calibrated
-from jointscope.graphs.joint_kinds.discover_arm import calibrated, diagnosed
+from jointscope.graphs.joint_kinds.discover_arm import diagnosed
 from jointscope.graphs.joint_kinds.effect_judge import ArmCandidate
+from jointscope.graphs.joint_kinds.likeliest_effect import calibrated
 from jointscope.graphs.rest_search.discover_rests import RestDiscovery, diagnose_rests
 from jointscope.graphs.solving.batch_solver import Progress
 from jointscope.graphs.solving.solver_context import in_solver_context

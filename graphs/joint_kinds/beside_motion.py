@@ -58,7 +58,9 @@ def calibrate_beside_motion(
     """
     began, report = time.perf_counter(), progress or (lambda text, share: None)
     close = options.get("near") is not None
-    alone = calibrate_frequency(robot, shaken, lambda text, share: report(f"responses: {text}", 0.2 * share), close)
+    alone = calibrate_frequency(
+        robot, shaken, lambda text, share: report(f"responses: {text}", 0.2 * share), close, complete=not close
+    )
     summary = alone.summary.without_friction()
     for _ in range(MOST_PASSES):
         result = calibrate(robot, recordings, sets=[*sets, summary], progress=report, **options)
