@@ -21,6 +21,7 @@ from jointscope.graphs.across_kinds.trials import Trials
 from jointscope.graphs.calibration.base_model import BaseModel
 from jointscope.graphs.frequency.calibrate_frequency import calibrate_frequency
 from jointscope.graphs.joint_kinds.motion_summary import MotionSummary
+from jointscope.graphs.poses.calibrate_poses import calibrate_poses
 from jointscope.graphs.poses.tracker_start import placed
 from jointscope.graphs.rests.rest_set import RestSet
 from jointscope.robots.files.effect_editing import add_effect
@@ -29,7 +30,7 @@ from jointscope.robots.geometry.arm_effects import hypotheses
 from jointscope.tools.simulator.pose_simulation import PoseConditions, simulate_poses
 
 pytest.importorskip("mujoco", reason="levers are moved by MuJoCo, which the extra `sim` brings")
-DRIFT = 2e-4  # [m]
+DRIFT = 1e-4  # [m]
 
 
 def quiet(text, share):
@@ -73,7 +74,7 @@ def test_the_factor_of_a_motion_is_what_its_samples_say(base):
         index = at.columns[DYNAMICS]
         inner = np.linalg.solve(system.D, system.B)
         total += (system.C - np.einsum("kip,kiq->pq", system.B, inner))[index, index]
-    np.testing.assert_allclose(np.sqrt(np.diag(np.linalg.inv(total))), np.sqrt(np.diag(summary.covariance)), rtol=1e-3)
+    np.testing.assert_allclose(np.sqrt(np.diag(np.linalg.inv(total))), np.sqrt(np.diag(summary.covariance)), rtol=1e-2)
 
 
 def test_the_cost_of_the_factor_has_its_slope_and_is_least_at_zero(base):
@@ -90,8 +91,10 @@ def test_the_cost_of_the_factor_has_its_slope_and_is_least_at_zero(base):
         step = size * np.eye(len(shift))[i]
         slope = (cost(shift + step) - cost(shift - step)) / (2.0 * size)
         assert slope == pytest.approx(system.g_p[i], rel=1e-5, abs=1e-6 * abs(system.g_p).max())
-    lowest = at.dynamics - np.linalg.pinv(summary.information) @ summary.linearize(x, at).g_p
-    assert summary.linearize(x, at.with_points({DYNAMICS: lowest})).cost == pytest.approx(0.0, abs=1e-6)
+    unit = np.array([base[1].robot.parameters[name].coordinate_sigma for name in summary.names])
+    A, g = summary.information * np.outer(unit, unit), summary.linearize(x, at).g_p * unit
+    lowest = at.dynamics - unit * (np.linalg.pinv(A, rcond=1e-12, hermitian=True) @ g)
+    assert summary.linearize(x, at.with_points({DYNAMICS: lowest})).cost == pytest.approx(0.0, abs=1e-4)
 
 
 def test_a_trial_beside_the_factor_of_the_motion_ends_where_all_samples_do(base):
@@ -141,14 +144,18 @@ def test_one_number_of_all_kinds_is_known_better_than_without_any_of_them(tmp_pa
 
     def sigma(kinds):
         near = BaseModel.of(grown, kinds.motion) if kinds.motion else None
-        p = calibrate_shared(grown, kinds, near, quiet).robot.parameters[name]
-        assert abs(p.value - size) < 3.0 * p.sigma, kinds.kinds
+        return known(calibrate_shared(grown, kinds, near, quiet).robot)
+
+    def known(robot):
+        p = robot.parameters[name]
+        assert abs(p.value - size) < 3.0 * p.sigma
         return p.sigma
 
-    every = sigma(given)
-    assert every < most
-    for without in ({"motion": ()}, {"poses": ()}, {"rests": ()}):
-        assert sigma(replace(given, **without)) > 1.02 * every, without
+    every, still = sigma(given), sigma(replace(given, motion=()))
+    assert every < most and still > 2.0 * every
+    assert known(calibrate_poses(grown, given.poses).robot) > 2.0 * still
+    for without in ({"poses": ()}, {"rests": ()}):  # motion knows it a hundred times better than these
+        assert sigma(replace(given, **without)) > every
 
 
 @pytest.mark.slow
