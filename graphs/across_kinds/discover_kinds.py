@@ -150,10 +150,10 @@ class _Search:
             return None
         trials = Trials(self.given, last.model, self._part(), self.solver)
         while (candidate := leading(last.found, refused)) is not None:
-            label, refit = candidate.label, _refit_of(last.found, candidate)
+            label = candidate.label
             self.report(f"calibrating all kinds with {label}", 0.9)
             try:
-                trial = trials.of(_with(last, candidate, refit), refit)
+                trial = trials.of(_with(last, candidate))
                 worse = self._why_not(candidate, trial)
                 if not worse and not trial.model.settled:
                     trial = trials.settled(trial)
@@ -249,16 +249,13 @@ def leading(found: KindsDiagnosis, refused: Collection[str] = ()) -> AcrossKinds
     return max(first.values(), key=lambda c: c.evidence, default=None)
 
 
-def _refit_of(found: KindsDiagnosis, candidate: AcrossKinds) -> Robot | None:
-    """The model of the motion with an effect, where the motion shows it and it was fitted."""
-    if found.motion is None or MOTION not in candidate.shown_by:
-        return None
-    return found.motion.refits.get(candidate.label)
-
-
-def _with(step: KindsStep, candidate: AcrossKinds, refit: Robot | None) -> Robot:
+def _with(step: KindsStep, candidate: AcrossKinds) -> Robot:
     """The model of a step with an effect."""
-    hypothesis = next((c.hypothesis for c in step.found.arm if c.hypothesis.label == candidate.label), None)
+    found = step.found
+    hypothesis = next((c.hypothesis for c in found.arm if c.hypothesis.label == candidate.label), None)
+    refit = None
+    if found.motion is not None and MOTION in candidate.shown_by:
+        refit = found.motion.refits.get(candidate.label)
     return with_shared_effect(step.model.robot, candidate, hypothesis, refit)
 
 

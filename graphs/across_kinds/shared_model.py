@@ -40,7 +40,7 @@ class SharedModel:
         still: the calibration of the kinds at rest; None beside motion.
         poses: the poses that were used, without outliers.
         weights: of rests, as their scatter asks for; empty without.
-        settled: whether the noise of the motion was found with these values, as of a model that is no trial.
+        settled: whether the samples of the motion were asked; of a trial their factor may have been.
     """
 
     robot: Robot
@@ -57,7 +57,6 @@ def calibrate_shared(
     near: BaseModel | None,
     report: Progress,
     solver: Solver = solve,
-    once: bool = False,
 ) -> SharedModel:
     """Calibrates a model with all recordings in one graph.
 
@@ -67,7 +66,6 @@ def calibrate_shared(
         near: a model of the same motion, for states and biases of its recordings; None without motion.
         report: called with a text and the share done.
         solver: minimises the cost of all samples.
-        once: whether the noise of the motion is taken as the robot has it, as in a trial.
 
     Raises:
         JointscopeError: as of `calibrate`, `calibrate_poses`, `calibrate_frequency` and `calibrate_rests`.
@@ -80,10 +78,10 @@ def calibrate_shared(
     calibration = partial(calibrate, sets=still_sets)
     if given.shaken:
         calibration = partial(calibrate_beside_motion, shaken=given.shaken, sets=still_sets)
-    motion = BaseModel.of(robot, given.motion, near, once=once, solver=solver, calibration=calibration)
+    motion = BaseModel.of(robot, given.motion, near, solver=solver, calibration=calibration)
     result = with_rests(motion.result)
     motion = replace(motion, robot=result.robot, result=result)
-    return SharedModel(result.robot, motion, None, poses, tuple(at_rest), not once)
+    return SharedModel(result.robot, motion, None, poses, tuple(at_rest))
 
 
 def standing_still(

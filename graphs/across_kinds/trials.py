@@ -2,13 +2,14 @@
 """Models with one more effect, calibrated with all kinds as cheaply as the question allows.
 
 Most effects are refused, so a trial need not be a model for good. Where an effect does nothing in the motion, that is
-the Gaussian factor that it was at the last model. Where it does, the motion begins with the states of the last model
-and with the noise that the refit of the motion alone found, and keeps it. What is believed is then calibrated in full.
+the Gaussian factor that it was at the last model; what is believed is then calibrated in full. Where it does, all
+samples are asked, from the states of the last model on, and for their noise, too: beside one that a fit of the motion
+alone has found, kinds that contradict each other would have another say.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 
 from jointscope.graphs.across_kinds.beside_still_motion import calibrate_trial, does_nothing_in_motion
@@ -49,12 +50,11 @@ class Trials:
     report: Progress
     solver: Solver = solve
 
-    def of(self, grown: Robot, refit: Robot | None) -> Trial:
+    def of(self, grown: Robot) -> Trial:
         """The model with an effect that has some sizes.
 
         Args:
             grown: the robot with the effect.
-            refit: the model of the motion with the effect, fitted there; None without.
 
         Raises:
             JointscopeError: as of `calibrate_shared`.
@@ -63,10 +63,7 @@ class Trials:
             found = calibrate_trial(grown, self.given, self.base, self._motion, self.report)
             if found is not None:
                 return Trial(found, self._without)
-        known = refit is not None and refit.layout == grown.layout and refit.noise.estimate
-        if known and refit is not None:
-            grown = replace(grown, noise=refit.noise)
-        return Trial(self._calibrated(grown, self.base, known), self.base)
+        return Trial(self._calibrated(grown, self.base), self.base)
 
     def settled(self, trial: Trial) -> Trial:
         """The model of a trial, calibrated in full.
@@ -86,8 +83,8 @@ class Trials:
         """
         return self._calibrated(robot, self.base)
 
-    def _calibrated(self, robot: Robot, near: SharedModel, once: bool = False) -> SharedModel:
-        return calibrate_shared(robot, self.given, near.motion, self.report, self.solver, once)
+    def _calibrated(self, robot: Robot, near: SharedModel) -> SharedModel:
+        return calibrate_shared(robot, self.given, near.motion, self.report, self.solver)
 
     @cached_property
     def _motion(self) -> MotionSummary:

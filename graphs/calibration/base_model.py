@@ -72,7 +72,6 @@ class BaseModel:
         start: BaseModel | None = None,
         *,
         by_torques: bool | None = None,
-        once: bool = False,
         solver: Solver = solve,
         calibration: Callable[..., CalibrationResult] = calibrate,
     ) -> BaseModel:
@@ -83,7 +82,6 @@ class BaseModel:
             recordings: training recordings.
             start: a model of the same recordings whose values and states are near; nothing is guessed anew.
             by_torques: see there; as the start where there is one, else wherever the robot allows it.
-            once: whether the noise of the robot is taken as it is.
             solver: minimises the cost of all samples.
             calibration: `calibrate`, or what calibrates with recordings of other kinds in the same graph.
         """
@@ -93,7 +91,7 @@ class BaseModel:
         full = with_full_gyros(robot).without(torques)  # no column of the score test says what these would see
         full = without_lasting(full)  # what is missing must not hide in torques that last
         full = holding_sharpness(full, recordings)  # nor in a friction that is rounded off
-        near = None if start is None else NearSolution(start.calibrations, start.states_for(full), once)
+        near = None if start is None else NearSolution(start.calibrations, start.states_for(full))
         # motors behind which links swing that nobody sees tell of these while they move
         moving = by_torques or (seen_by_one_encoder(full) and len(full.noise.unseen) > 0)
         result = calibration(full, recordings, near=near, standstill=not moving, memory=False, solver=solver)

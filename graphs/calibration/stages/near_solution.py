@@ -26,12 +26,10 @@ class NearSolution:
     Attributes:
         calibrations: values with the biases of each recording.
         states: of each recording at its ticks, shape (m, d); from the measurements where empty.
-        once: whether the noise of the robot is taken as it is, as where others are judged beside it.
     """
 
     calibrations: Sequence[Calibration]
     states: Sequence[Array] = ()
-    once: bool = False
 
     def states_of(self, problems: Sequence[BagProblem]) -> Sequence[Array]:
         """The states, if they are those of some problems; none if ticks or layout are others."""

@@ -119,8 +119,7 @@ class WholeStage:
     def from_both_sides(self, above: Solved) -> Solved:
         """A solution, or a better one with less noise, where encoders do not show how joints turn over."""
         blunt = blunt_sharpness(above.robot, [p.recording for p in above.problems])
-        asked = above.robot.noise.estimate and not self._once
-        return self._from_below(above) if blunt and asked else above
+        return self._from_below(above) if blunt and above.robot.noise.estimate else above
 
     def with_memory(self, white: Solved) -> Solved:
         """The solution with random torques that last, where the recordings ask for them; else the one that is given."""
@@ -164,7 +163,7 @@ class WholeStage:
             # states that a large process noise lets follow the samples leave less of their noise than there is
             follow = bool(np.any(change < -NOISE_AGREES))
             other = _with_sigmas(problems, solved, self.stated) if self.sigmas and not follow else None
-            if self._once or (other is None and np.all(np.abs(change) < self.agrees)):
+            if other is None and np.all(np.abs(change) < self.agrees):
                 break
             noise = updates.update(noise, solved.evidence.factors) if noise.estimate else noise
             problems, estimate = other or problems, solution.estimate
@@ -192,11 +191,6 @@ class WholeStage:
         solution = self.solver(now, estimate, max_iterations=most, hold=self.hold, progress=self.progress)
         self.history.add(name, solution)
         return solution
-
-    @property
-    def _once(self) -> bool:
-        """Whether the noise is taken as it is."""
-        return self.near is not None and self.near.once
 
     def _sets_of(self, problems: Sequence[BagProblem]) -> list[SetProblem]:
         """The recordings of other kinds on the robot of the motions."""

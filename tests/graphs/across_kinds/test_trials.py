@@ -123,7 +123,7 @@ def test_known_states_lead_where_those_from_the_measurements_do_in_fewer_steps(b
 def test_no_sample_of_the_motion_is_looked_at_for_an_effect_that_does_nothing_in_it(base, monkeypatch):
     given, model = base
     monkeypatch.setattr(trials_module, "calibrate_shared", None)  # would look
-    tried = Trials(given, model, quiet).of(drifting(model.robot), None)
+    tried = Trials(given, model, quiet).of(drifting(model.robot))
     assert tried.beside is model and not tried.model.settled
 
 
