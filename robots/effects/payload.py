@@ -75,7 +75,7 @@ EFFECT = Payload(
     change=change,
     last_only=True,
     parameters=(EffectParameter("inertia", "kg m2", start=0.01, prior_sigma=10.0, sign="+"),),
-    mass=EffectParameter("mass", "kg", start=0.0, prior_sigma=10.0),
+    mass=EffectParameter("mass", "kg", start=0.1, prior_sigma=10.0, sign="+"),
     example={"inertia": 0.05},
     card=Card(
         title="unknown load at the tip",
@@ -89,6 +89,7 @@ EFFECT = Payload(
         typical="1 to 50 % of the last body's own inertia",
         excitation="acceleration of all joints that move the last body, in several postures",
         look_alikes={
+            "torque_constant_error": "where rotors' inertias are not known, a load scales torques as a drive does",
             "link_mass": "a load that is always there is a mass of the link that carries it",
             "inertia_error": "a payload is one combination of errors of the last body's moments of inertia",
         },
