@@ -174,6 +174,21 @@ def test_four_kinds_find_one_load_that_responses_alone_are_led_astray_by(tmp_pat
 
 
 @pytest.mark.slow
+def test_a_torque_constant_of_an_elastic_drive_is_one_number_of_motion_and_rests_beside_poses(tmp_path):
+    lever, share = Lever(tmp_path), 0.05
+    poses, own, others = lever.seen(), lever.hanging(), lever.hanging(20, 17)
+    rests, held = (replace(r, u=r.u / (1.0 + share)) for r in (own, others))
+    lever.effects = [f"torque_constant_error@swing:share={share}"]
+    given = KindsRecordings((lever.moved(),), (poses,), rests=(rests,))
+    found = discover_kinds(lever.robot, given, KindsRecordings(rests=(held,)), missing_torque=False)
+    assert labels(found) == {"torque_constant_error@swing"} and found.adequate
+    assert found.steps[1].added.shown_by == ("motion", "rests")
+    p = found.robot.parameters["swing.torque_constant_error.share"]
+    assert value(found.robot, p.name, share) and abs(p.value - share) < 1e-4
+    assert found.errors[-1][1]["rests"] < 1.2
+
+
+@pytest.mark.slow
 def test_nothing_comes_into_a_true_model_of_four_kinds(tmp_path):
     lever, kinds = Lever(tmp_path), ("motion", "poses", "rests", "frequency")
     found = discover_kinds(lever.robot, lever.recordings(*kinds), missing_torque=False)
