@@ -29,8 +29,10 @@ from jointscope.graphs.discovery.diagnosis_result import Diagnosis
 from jointscope.graphs.discovery.side_by_side import solver_of
 from jointscope.graphs.discovery.starting_model import starting_model
 from jointscope.graphs.joint_kinds.arm_candidates import Calibrated
-from jointscope.graphs.joint_kinds.discover_arm import calibrated, diagnosed
+from jointscope.graphs.joint_kinds.discover_arm import diagnosed
 from jointscope.graphs.joint_kinds.effect_judge import ArmCandidate
+from jointscope.graphs.joint_kinds.likeliest_effect import calibrated
+from jointscope.graphs.joint_kinds.spring_screen import badly_explained
 from jointscope.graphs.rest_search.discover_rests import RestDiscovery, diagnose_rests
 from jointscope.graphs.solving.batch_solver import Progress
 from jointscope.graphs.solving.solver_context import in_solver_context
@@ -146,7 +148,9 @@ def ask_kinds(
     motion, motion_base = (before.motion, before.motion_base) if before else (None, None)
     if given.motion and anew(MOTION):
         motion, motion_base = _moving(robot, given, held, report, options, motion_base)
-    return KindsDiagnosis(robot, _together(motion, arm, kinds, at_rest), motion, arm, kinds, base, at_rest, motion_base)
+    return KindsDiagnosis(
+        robot, _together(motion, arm, kinds, at_rest, base), motion, arm, kinds, base, at_rest, motion_base
+    )
 
 
 def _moving(
@@ -170,11 +174,16 @@ def _moving(
 
 
 def _together(
-    motion: Diagnosis | None, arm: Sequence[ArmCandidate], kinds: Sequence[str], at_rest: RestDiscovery | None
+    motion: Diagnosis | None,
+    arm: Sequence[ArmCandidate],
+    kinds: Sequence[str],
+    at_rest: RestDiscovery | None,
+    base: Calibrated | None,
 ) -> tuple[AcrossKinds, ...]:
     """All effects, from what each kind says."""
     said: dict[str, dict[str, Said]] = {} if motion is None else {MOTION: said_by_motion(motion)}
-    said |= said_by_arm(arm, kinds)
+    shaken = None if base is None else base.frequency
+    said |= said_by_arm(arm, kinds, shaken is None or not badly_explained(shaken.explained))
     if at_rest is not None:
         said[RESTS] = said_by_rests(at_rest.candidates)
     others = [label for kind, each in said.items() if kind not in kinds for label in each]

@@ -24,6 +24,7 @@ from jointscope.graphs.across_kinds.shared_model import (
     errors_by_kind,
     heldout_by_kind,
 )
+from jointscope.graphs.across_kinds.trials import Trial, Trials
 from jointscope.graphs.discovery.side_by_side import solver_of
 from jointscope.graphs.discovery.verdicts import MATTERS, SAME, SURE
 from jointscope.graphs.solving.batch_solver import Progress
@@ -127,6 +128,7 @@ class _Search:
         self.options = {"each_held_out": False, **options}
         self.solver = solver_of(options.get("side_by_side"))
         self.steps: list[KindsStep] = []
+        self._known: dict[int, tuple[SharedModel, dict[str, float]]] = {}
 
     def run(self, robot: Robot) -> KindsDiscovery:
         """All steps."""
@@ -143,37 +145,48 @@ class _Search:
 
     def _grown(self, refused: dict[str, str]) -> tuple[AcrossKinds, SharedModel] | None:
         """The effect that comes in, and the model with it; None, and why, where none does."""
-        last, was = self.steps[-1], dict[str, float]()
+        last = self.steps[-1]
         if self._added >= MOST_STEPS:
             return None
+        trials = Trials(self.given, last.model, self._part(), self.solver)
         while (candidate := leading(last.found, refused)) is not None:
             label = candidate.label
             self.report(f"calibrating all kinds with {label}", 0.9)
             try:
-                model = self._calibrated(_with(last, candidate), last.found)
+                trial = trials.of(_with(last, candidate))
+                worse = self._why_not(candidate, trial)
+                if not worse and not trial.model.settled:
+                    trial = trials.settled(trial)
+                    worse = self._why_not(candidate, trial)
+                if not worse:
+                    return candidate, trial.model
             except JointscopeError as err:
-                refused[label] = f"cannot be calibrated with all kinds ({err})"
-                continue
-            was = was or errors_by_kind(last.model, self.given, last.model)
-            worse = self._why_not(candidate, was, errors_by_kind(model, self.given, last.model))
-            if not worse:
-                return candidate, model
+                worse = f"cannot be calibrated with all kinds ({err})"
             refused[label] = worse
         return None
 
-    def _why_not(self, candidate: AcrossKinds, was: Mapping[str, float], now: Mapping[str, float]) -> str:
+    def _why_not(self, candidate: AcrossKinds, trial: Trial) -> str:
         """What speaks against an effect once all kinds are in one graph, by errors; empty if nothing does."""
+        last = self.steps[-1]
         # kinds that cannot show it may give way while they lack something else: they have no say
         told = [kind for kind in candidate.seen_by if not _by_friction(kind, self.given)]
+        was = self._errors(trial.beside, told)
+        now = errors_by_kind(trial.model, self.given, last.model, told)
         worse = [kind for kind in told if now[kind] ** 2 > (1.0 + SAME) ** 2 * was[kind] ** 2]
         if worse:
             kind = worse[0]
             return f"raises the error in {kind} from {was[kind]:.3g} to {now[kind]:.3g}"
-        judged = [k for k in told if k in candidate.shown_by and not _by_torques(k, self.steps[-1].found)]
+        judged = [k for k in told if k in candidate.shown_by and not _by_torques(k, last.found)]
         better = [kind for kind in judged if now[kind] ** 2 < (1.0 - MATTERS) * was[kind] ** 2]
         if judged and not better:
             return f"leaves the error in {' and '.join(judged)} as it was"
         return ""
+
+    def _errors(self, model: SharedModel, kinds: Collection[str]) -> dict[str, float]:
+        """Of a model beside which others are tried, worked out once per kind."""
+        known = self._known.setdefault(id(model), (model, {}))[1]
+        known |= errors_by_kind(model, self.given, self.steps[-1].model, [k for k in kinds if k not in known])
+        return known
 
     def _add(self, candidate: AcrossKinds, model: SharedModel) -> None:
         found = self._asked(model, candidate.seen_by)
@@ -189,7 +202,7 @@ class _Search:
                 continue
             try:
                 smaller = without_shared_effect(last.model.robot, step.added.label, before)
-                model = self._calibrated(smaller, last.found)
+                model = Trials(self.given, last.model, self._part(), self.solver).smaller(smaller)
             except JointscopeError:
                 continue
             if not self._raised(last.model, model):

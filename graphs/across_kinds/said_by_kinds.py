@@ -4,6 +4,7 @@
 Each kind (poses and frequency responses share a graph) is calibrated and judged by its own left-out recordings: held to
 the values of a kind that shows an effect, a model that lacks it would show others in the next kind.
 
+- Steps from a model of which responses say that one is missing lead anywhere: their sizes speak against nothing.
 - An effect is missing where a kind shows it and no kind has a size for it that contradicts (sizes are linear steps, or
   fits of one kind). One that a kind leaves possible is absent where another kind has a size that contradicts.
 - Look-alikes of one kind stay alike only where every kind that shows the effect has them. Where a kind shows one of two
@@ -41,6 +42,7 @@ class Said:
         look_alikes: labels of effects that do the same in this kind.
         why: why it is untestable.
         evidence: twice the logarithm of how much likelier what was left out becomes; 0 where that is not known.
+        sure: whether its sizes may speak against others: steps from a model that explains little lead anywhere.
     """
 
     verdict: str
@@ -48,6 +50,7 @@ class Said:
     look_alikes: tuple[str, ...] = ()
     why: str = ""
     evidence: float = 0.0
+    sure: bool = True
 
 
 @dataclass(frozen=True)
@@ -125,7 +128,8 @@ def across_kinds(kinds: Mapping[str, Mapping[str, Said]]) -> tuple[AcrossKinds, 
         by_kind = {kind: each[label] for kind, each in kinds.items() if label in each}
         shown = [said for said in by_kind.values() if said.verdict == "missing"]
         shown = shown or [said for said in by_kind.values() if said.verdict in ("possible", "stand_in")]
-        seen = ((kind, said) for kind, said in by_kind.items() if said.verdict != "untestable")
+        shown = [said for said in shown if said.sure] or shown
+        seen = ((kind, said) for kind, said in by_kind.items() if said.verdict != "untestable" and said.sure)
         against = tuple(kind for kind, said in seen if any(_contradicts(said, other) for other in shown))
         found[label] = AcrossKinds(label, by_kind, against)
     told = [replace(c, explained_by=_explaining(c, found)) for c in found.values()]
@@ -138,10 +142,18 @@ def _explaining(c: AcrossKinds, found: Mapping[str, AcrossKinds]) -> str:
         other = found.get(label)
         if other is None or other.against:
             continue
-        for kind in other.shown_by:
-            if kind not in c.shown_by and kind in c.by_kind and c.by_kind[kind].verdict != "untestable":
-                return label
+        if other.evidence < c.evidence and _shown_instead(c, other):
+            continue  # each is shown where the other could be: more evidence is better
+        if _shown_instead(other, c):
+            return label
     return ""
+
+
+def _shown_instead(one: AcrossKinds, other: AcrossKinds) -> bool:
+    """Whether a kind whose sizes can be trusted shows one of two effects and not the other, though it could."""
+    kinds = (kind for kind in one.shown_by if one.by_kind[kind].sure)
+    known = ((kind, other.by_kind.get(kind)) for kind in kinds if kind not in other.shown_by)
+    return any(said is not None and said.verdict != "untestable" for _, said in known)
 
 
 def _contradicts(one: Said, other: Said) -> bool:
@@ -182,18 +194,22 @@ def said_by_rests(candidates: Iterable[RestCandidate]) -> dict[str, Said]:
     return {c.label: Said(c.verdict, c.sizes, c.look_alikes, c.why, 2.0 * c.gain) for c in candidates}
 
 
-def said_by_arm(candidates: Sequence[ArmCandidate], kinds: Sequence[str]) -> dict[str, dict[str, Said]]:
+def said_by_arm(
+    candidates: Sequence[ArmCandidate], kinds: Sequence[str], sure: bool = True
+) -> dict[str, dict[str, Said]]:
     """What poses and frequency responses say, by kind and label.
 
     Args:
         candidates: judged by both in one graph, which has one size for both.
         kinds: of the recordings that there are.
+        sure: whether the model without any of them explains the responses.
     """
     found: dict[str, dict[str, Said]] = {kind: {} for kind in kinds}
     for c in candidates:
         unit = "rad/(N m)" if c.hypothesis.kind.soft else c.hypothesis.kind.unit
-        pairs = zip(c.hypothesis.names, c.sizes, c.sigmas, strict=True)
-        sizes = {_last_part(name, c.hypothesis.kind.soft): (value, sigma, unit) for name, value, sigma in pairs}
+        pairs = zip(c.hypothesis.catalogue_names, c.sizes, c.sigmas, strict=True)
+        soft, factor = c.hypothesis.kind.soft, c.hypothesis.kind.catalogue[1]
+        sizes = {_last_part(name, soft): (factor * value, sigma, unit) for name, value, sigma in pairs}
         evidence = c.evidence  # of both kinds together: it counts once
         for kind in kinds:
             unseen = c.hypothesis.kind.unseen.get(kind, "")
@@ -201,7 +217,7 @@ def said_by_arm(candidates: Sequence[ArmCandidate], kinds: Sequence[str]) -> dic
             if verdict == "missing" and len(kinds) > 1 and kind not in c.shown_by:
                 verdict = "possible"
             alike = c.alone.get(kind, c.look_alikes)
-            found[kind][c.hypothesis.label] = Said(verdict, sizes, alike, unseen, evidence)
+            found[kind][c.hypothesis.label] = Said(verdict, sizes, alike, unseen, evidence, sure)
             evidence = 0.0 if verdict == "missing" else evidence
     return found
 

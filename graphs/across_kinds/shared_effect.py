@@ -2,8 +2,9 @@
 """An effect put into the one model that recordings of all kinds share, in the words of those that know it.
 
 The catalogue is what motion and rests read, names of arm_effects.py are what poses and frequency responses read. Where
-both have the same names an effect is one number for all kinds. A rigid joint becomes an elastic one, whose spring all
-kinds read. Where they have other numbers for it (a gap, a bearing, an inertia), each side that shows it gets its own.
+both have the same names an effect is one number for all kinds; so is a gap, which poses read as motion has it, too.
+A rigid joint becomes an elastic one, whose spring all kinds read. Where they have other laws for it (a bearing that
+turns with the arm or stands before the joint, an inertia), each side that shows it gets its own.
 """
 
 from __future__ import annotations
@@ -47,11 +48,11 @@ def with_shared_effect(
     grown = robot
     if hypothesis is None or _of_catalogue(robot, effect, owner):
         known = add_effect(robot, found.label, start)
-        same = hypothesis is not None and {*hypothesis.names} <= {*known.parameters}
+        same = hypothesis is not None and {*hypothesis.catalogue_names} <= {*known.parameters}
         if same or {MOTION, RESTS} & {*found.shown_by}:
             grown = known
     if hypothesis is not None and {POSES, FREQUENCY} & {*found.shown_by}:
-        if not {*hypothesis.names} <= {*grown.parameters}:
+        if not {*hypothesis.catalogue_names} <= {*grown.parameters}:
             grown = with_effect(grown, hypothesis, _of_arm(hypothesis, start))
     return grown
 
@@ -98,6 +99,8 @@ def _of_arm(hypothesis: ArmHypothesis, start: Mapping[str, float]) -> dict[str, 
         last = name.rpartition(".")[2]
         if hypothesis.kind.soft:
             found[name] = 1.0 / max(start[last.replace(STIFFNESS, "compliance")], 0.1 * softest)
+        elif hypothesis.kind.catalogue[0]:
+            found[name] = hypothesis.kind.catalogue[1] * start[hypothesis.kind.catalogue[0].rpartition(".")[2]]
         else:
             found[name] = start[last]
     return found

@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 
@@ -40,6 +40,7 @@ class SharedModel:
         still: the calibration of the kinds at rest; None beside motion.
         poses: the poses that were used, without outliers.
         weights: of rests, as their scatter asks for; empty without.
+        settled: whether the samples of the motion were asked; of a trial their factor may have been.
     """
 
     robot: Robot
@@ -47,17 +48,22 @@ class SharedModel:
     still: WithRests | None
     poses: PoseCalibration | None
     weights: tuple[RestSet, ...]
+    settled: bool = True
 
 
 def calibrate_shared(
-    robot: Robot, given: KindsRecordings, near: BaseModel | None, report: Progress, solver: Solver = solve
+    robot: Robot,
+    given: KindsRecordings,
+    near: BaseModel | None,
+    report: Progress,
+    solver: Solver = solve,
 ) -> SharedModel:
     """Calibrates a model with all recordings in one graph.
 
     Args:
         robot: with values near the end.
         given: recordings of more than one kind.
-        near: a model of the same motion, for the biases of its recordings; None without motion.
+        near: a model of the same motion, for states and biases of its recordings; None without motion.
         report: called with a text and the share done.
         solver: minimises the cost of all samples.
 
@@ -67,21 +73,33 @@ def calibrate_shared(
     if not given.motion:
         still = calibrate_with_rests(robot, given.rests, given.poses, given.shaken, report)
         return SharedModel(still.robot, None, still, still.poses, still.rests.problems)
-    poses = None
-    if given.poses:
-        poses = calibrate_poses(robot, given.poses, report)
-        robot = _placed(robot, poses)
-    robot, at_rest = weighted_rests(robot, given.motion, given.rests, report)
-    still_sets: list[SetProblem] = [*at_rest, *_own_size(robot, poses)]
+    robot, poses, at_rest = standing_still(robot, given, report)
+    still_sets: list[SetProblem] = [*at_rest, *own_size(robot, poses)]
     calibration = partial(calibrate, sets=still_sets)
     if given.shaken:
         calibration = partial(calibrate_beside_motion, shaken=given.shaken, sets=still_sets)
     motion = BaseModel.of(robot, given.motion, near, solver=solver, calibration=calibration)
     result = with_rests(motion.result)
-    return SharedModel(result.robot, replace(motion, robot=result.robot, result=result), None, poses, tuple(at_rest))
+    motion = replace(motion, robot=result.robot, result=result)
+    return SharedModel(result.robot, motion, None, poses, tuple(at_rest))
 
 
-def _own_size(robot: Robot, poses: PoseCalibration | None) -> list[SetProblem]:
+def standing_still(
+    robot: Robot, given: KindsRecordings, report: Progress
+) -> tuple[Robot, PoseCalibration | None, list[RestSet]]:
+    """The kinds without states that move, each brought near its end alone; and the robot with what they know better.
+
+    Arguments as of `calibrate_shared`.
+    """
+    poses = None
+    if given.poses:
+        poses = calibrate_poses(robot, given.poses, report)
+        robot = _placed(robot, poses)
+    robot, at_rest = weighted_rests(robot, given.motion, given.rests, report)
+    return robot, poses, at_rest
+
+
+def own_size(robot: Robot, poses: PoseCalibration | None) -> list[SetProblem]:
     """Poses whose robot has the sizes of noise that they told."""
     if poses is None:
         return []
@@ -99,15 +117,24 @@ def _placed(robot: Robot, poses: PoseCalibration) -> Robot:
     return replace(robot.with_values(better), poses=poses.robot.poses)
 
 
-def errors_by_kind(model: SharedModel, given: KindsRecordings, weights: SharedModel) -> dict[str, float]:
-    """How far off a model is in each kind of its training recordings, in sigmas of the noise of `weights`."""
-    found = {}
-    if model.motion is not None:
+def errors_by_kind(
+    model: SharedModel, given: KindsRecordings, weights: SharedModel, kinds: Collection[str] | None = None
+) -> dict[str, float]:
+    """How far off a model is in its training recordings of some kinds, in sigmas of the noise of `weights`.
+
+    Args:
+        model: the model.
+        given: all recordings for training.
+        weights: whose noise counts.
+        kinds: which of them; None for all.
+    """
+    asked, found = given.kinds if kinds is None else kinds, {}
+    if model.motion is not None and MOTION in asked:
         base = model.motion
         found[MOTION] = judged_error(base, base.robot, base.calibrations, fit_and_judge(base)[1]).error
-    if model.poses is not None:
+    if model.poses is not None and POSES in asked:
         found[POSES] = whitened(model.robot, weights.robot.poses, model.poses.problems)
-    return found | _without_states(model.robot, given, weights)
+    return found | _without_states(model.robot, given, weights, asked)
 
 
 def heldout_by_kind(model: SharedModel, held: KindsRecordings, weights: SharedModel) -> dict[str, float]:
@@ -117,16 +144,18 @@ def heldout_by_kind(model: SharedModel, held: KindsRecordings, weights: SharedMo
         found[MOTION] = reported_heldout_error(model.robot, held.motion[0])
     if held.poses:
         found[POSES] = whitened(model.robot, weights.robot.poses, placed(model.robot, held.poses)[1])
-    return found | _without_states(model.robot, held, weights)
+    return found | _without_states(model.robot, held, weights, held.kinds)
 
 
-def _without_states(robot: Robot, recordings: KindsRecordings, weights: SharedModel) -> dict[str, float]:
+def _without_states(
+    robot: Robot, recordings: KindsRecordings, weights: SharedModel, asked: Collection[str]
+) -> dict[str, float]:
     """Errors where the values say all: the share of the torques that is left, and what friction cannot hold."""
     found = {}
-    if recordings.shaken:
+    if recordings.shaken and FREQUENCY in asked:
         left = [each.fit.left for each in frequency_errors(robot, recordings.shaken)]
         found[FREQUENCY] = float(np.sqrt(np.mean(np.square(np.concatenate(left)))))
-    if recordings.rests:
+    if recordings.rests and RESTS in asked:
         found[RESTS] = _at_rest(robot, recordings.rests, weights.weights)
     return found
 

@@ -12,11 +12,13 @@ from numpy.typing import NDArray
 from jointscope.factors.calibration import Calibration
 from jointscope.graphs.calibration.calibrate import calibrate
 from jointscope.graphs.calibration.calibration_result import CalibrationResult
+from jointscope.graphs.calibration.stages.near_solution import NearSolution
 from jointscope.graphs.noise.lasting_noise import without_lasting
 from jointscope.graphs.problem.bag_problem import BagProblem, first_command_time
 from jointscope.graphs.problem.standstill import holding_sharpness
 from jointscope.graphs.problem.timeline import Timeline
 from jointscope.graphs.solving.batch_solver import Solver, solve
+from jointscope.robots.model.encoder_plays import unlagged
 from jointscope.robots.model.robot import Robot
 from jointscope.robots.parts.state_layout import StateLayout
 from jointscope.robots.recordings.recording import Recording
@@ -78,7 +80,7 @@ class BaseModel:
         Args:
             robot: the model with start values.
             recordings: training recordings.
-            start: a model of the same recordings whose values are near; nothing is guessed anew.
+            start: a model of the same recordings whose values and states are near; nothing is guessed anew.
             by_torques: see there; as the start where there is one, else wherever the robot allows it.
             solver: minimises the cost of all samples.
             calibration: `calibrate`, or what calibrates with recordings of other kinds in the same graph.
@@ -89,7 +91,7 @@ class BaseModel:
         full = with_full_gyros(robot).without([s for s in (robot.torque_sensor, robot.motor_current) if s is not None])
         full = without_lasting(full)  # what is missing must not hide in torques that last
         full = holding_sharpness(full, recordings)  # nor in a friction that is rounded off
-        near = [calibration for calibration in start.calibrations] if start is not None else None
+        near = None if start is None else NearSolution(start.calibrations, start.states_for(full))
         # motors behind which links swing that nobody sees tell of these while they move
         moving = by_torques or (seen_by_one_encoder(full) and len(full.noise.unseen) > 0)
         result = calibration(full, recordings, near=near, standstill=not moving, memory=False, solver=solver)
@@ -122,6 +124,11 @@ class BaseModel:
         own = self.problem_ticks(bag)
         x = np.column_stack([np.interp(ticks, own, column) for column in self.states[bag].T])
         return layout.carried_over(x, self.layout)
+
+    def states_for(self, robot: Robot) -> tuple[Array, ...]:
+        """Smoothed states of each recording in the layout of another robot, shape (m + 1, d)."""
+        same = [robot.layout.carried_over(x, self.layout) for x in self.states]
+        return tuple(unlagged(robot, x, known=self.layout.memories) for x in same)
 
     def problem_ticks(self, bag: int) -> Array:
         """Ticks of a recording, shape (m + 1,) [s]."""

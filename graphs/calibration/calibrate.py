@@ -34,6 +34,7 @@ from jointscope.graphs.calibration.friction_at_standstill import (
 )
 from jointscope.graphs.calibration.stages.encoder_noise import with_visible_noise
 from jointscope.graphs.calibration.stages.history import History
+from jointscope.graphs.calibration.stages.near_solution import NearSolution
 from jointscope.graphs.calibration.stages.solved import Solved
 from jointscope.graphs.calibration.stages.solved_windows import anchored
 from jointscope.graphs.calibration.stages.whole_stage import LOOSE, WholeStage, blunt_sharpness, blunted
@@ -81,7 +82,7 @@ def calibrate(
     recordings: Sequence[Recording],
     *,
     biases_only: bool = False,
-    near: Sequence[Calibration] | None = None,
+    near: NearSolution | None = None,
     standstill: bool = False,
     solver: Solver = solve,
     sets: Sequence[SetProblem] = (),
@@ -94,8 +95,8 @@ def calibrate(
         robot: model with start values and priors.
         recordings: at least one; parameters and rotations are shared, states and biases are each recording's own.
         biases_only: estimate states, biases and process noise only; dynamics and mounting stay as they are.
-        near: values with the biases of each recording that are near the solution already, where the robot's own values
-            and noise are, too: nothing is guessed, no windows are cut.
+        near: a point near the solution, where the robot's own values and noise are, too: nothing is guessed, no windows
+            are cut.
         standstill: whether friction is asked for its law where a joint stands or turns over, too, as where effects of
             slow motion are looked for; else what these moments say is left out.
         solver: minimises the cost of all samples; start values and a first noise come from windows, whatever it is.
@@ -126,7 +127,7 @@ def _calibrated(
     robot: Robot,
     recordings: Sequence[Recording],
     biases_only: bool,
-    near: Sequence[Calibration] | None,
+    near: NearSolution | None,
     standstill: bool,
     solver: Solver,
     sets: Sequence[SetProblem],
@@ -163,11 +164,11 @@ def _calibrated(
         noise, calibrations = _windows_stage(recordings, first, hold, history, _part(report, 0.0, 0.4))
         calibrations = [c.carried_to(Calibration.of(seen)) for c in calibrations]
     else:
-        calibrations = [Calibration.of(robot).with_points(c.own) for c in near]
+        calibrations = [Calibration.of(robot).with_points(c.own) for c in near.calibrations]
     problems = anchored(problems, calibrations)
     stated = {e.name: e.sigmas for e in (seen.motor_encoder, seen.link_encoder) if e is not None}
     anew = near is None and not biases_only
-    stage = WholeStage(hold, history, _part(report, 0.4, 1.0), anew, solver, sets, stated)
+    stage = WholeStage(hold, history, _part(report, 0.4, 1.0), anew, solver, sets, stated, near=near)
     solve_all = stage.solve if biases_only or standstill else partial(asked_at_standstill, stage)
     solved = solve_all(problems, noise, calibrations)
     solved = solved_with_filters(stage, solved, filters) if filters else solved

@@ -21,14 +21,15 @@ from jointscope.graphs.gtsam_solvers.reference_graph import (
 )
 from jointscope.graphs.gtsam_solvers.users_factor import what_is_wrong
 from jointscope.graphs.problem.bag_problem import BagProblem
-from jointscope.graphs.solving.condensed_graph import CondensedGraph
+from jointscope.graphs.solving.condensed_graph import STRETCH, CondensedGraph
 from jointscope.graphs.solving.estimate import Estimate
-from jointscope.graphs.solving.set_problem import Problem, motions_only
+from jointscope.graphs.solving.set_problem import Problem, motions, motions_only
 from jointscope.graphs.solving.stretch import RecordingStretch
 from jointscope.robots.errors import SolveError
 
 Array = NDArray[np.float64]
 
+MOST_SHOWN = 24  # stretches of motion: a graph is printed for a user
 INNER_STEPS = 10  # two or three are taken where friction reverses
 
 
@@ -87,7 +88,8 @@ class CalibrationGraph:
             problems: the recordings.
             estimate: where their calibration ended.
         """
-        condensed, values = CondensedGraph.of(problems, estimate)
+        steps = sum(len(problem.dynamics) for problem in motions(problems))
+        condensed, values = CondensedGraph.of(problems, estimate, length=max(STRETCH, -(-steps // MOST_SHOWN)))
         for stretch in (stretch for cuts in condensed.stretches for stretch in cuts):
             if isinstance(stretch, RecordingStretch):  # so that an error depends on its values alone
                 stretch.begin_here(INNER_STEPS)

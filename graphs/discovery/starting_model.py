@@ -22,6 +22,7 @@ import numpy as np
 from jointscope.factors.calibration import Calibration
 from jointscope.graphs.calibration.base_model import BaseModel, seen_by_one_encoder
 from jointscope.graphs.calibration.calibrate import calibrate
+from jointscope.graphs.calibration.stages.near_solution import NearSolution
 from jointscope.graphs.discovery.scored_candidates import segments_of
 from jointscope.graphs.discovery.verdicts import MATTERS
 from jointscope.graphs.judging.elastic_reaction import known_springs
@@ -115,7 +116,7 @@ def _as_sharp_as_told(base: BaseModel, solver: Solver = solve) -> BaseModel:
         return base
     try:
         asked = with_sharpness(robot, {joint: robot.sharpness_of(joint) for joint in told}, fixed=False)
-        near = base.calibrations
+        near = NearSolution(base.calibrations)
         found = calibrate(asked, base.recordings, near=near, standstill=True, memory=False, solver=solver).robot
         held = {joint: min(found.sharpness_of(joint), most) for joint, most in told.items()}
         sharper = {joint: k for joint, k in held.items() if k > robot.sharpness_of(joint)}

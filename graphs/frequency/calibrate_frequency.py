@@ -122,6 +122,7 @@ def calibrate_frequency(
     progress: Progress | None = None,
     near: bool = False,
     most: int = MOST_STAGES,
+    complete: bool = True,
 ) -> FrequencyCalibration:
     """Calibrates an arm from frequency responses.
 
@@ -131,6 +132,7 @@ def calibrate_frequency(
         progress: called with a text and the share done.
         near: whether the values of the robot are near the end.
         most: number of stages.
+        complete: whether the model must explain most of the torques; one that lacks a spring does not.
 
     Raises:
         RecordingError: a recording shows no response.
@@ -138,7 +140,7 @@ def calibrate_frequency(
     """
     began, report = time.perf_counter(), progress or (lambda text, share: None)
     problems = [first_stage(robot, ShakenPose.of(*recording)) for recording in recordings]
-    found_at = settled_stages(problems, [], report, near, most)
+    found_at = settled_stages(problems, [], report, near, most, complete)
     problems, solution = found_at.problems, found_at.solution
     summary = FrequencySummary.of(problems, solution.estimate.calibrations[0])
     start = Estimate(solution.estimate.states[:1], solution.estimate.calibrations[:1])

@@ -72,6 +72,7 @@ def settled_stages(
     report: Progress,
     near: bool = False,
     most: int = MOST_STAGES,
+    complete: bool = True,
 ) -> Settled:
     """Poses at the stage after which nothing moves, or at the last of many.
 
@@ -81,6 +82,7 @@ def settled_stages(
         report: as of `calibrate_frequency`.
         near: whether the robot's values are near the end, so that the logarithm need not find the way.
         most: number of stages.
+        complete: whether the model must explain most of the torques; one that lacks a spring does not.
 
     Raises:
         SolveError: a balance that explains nothing.
@@ -99,7 +101,7 @@ def settled_stages(
         sigmas = np.sqrt(np.diag(posteriors([*problems, *others], solution)[1])[index])
         moved, narrow = (known.dynamics - at) / sigmas, problems[0].stage.width == NEIGHBOURS
         if narrow and np.max(np.abs(moved)) < AGREES:
-            _check_left(problems, known)
+            must_explain(problems, known, complete)
             return Settled(problems, solution, iterations, stage + 1, True, {})
         ahead = _ahead(moved, None if step is None else step / sigmas)
         at, step = known.dynamics + ahead * sigmas, known.dynamics - at if narrow and not np.any(ahead) else None
@@ -107,14 +109,19 @@ def settled_stages(
         common = known.carried_to(common)
         problems = [next_stage(problem, known) for problem in problems]
     known = solution.estimate.calibrations[0]
-    _check_left(problems, known)
+    must_explain(problems, known, complete)
     steps = np.abs(known.dynamics - at) * known.value_by_coordinate
     last = dict(zip(known.names, steps.tolist(), strict=True))
     return Settled(problems, solution, iterations, stage + 1, False, last)
 
 
-def _check_left(problems: Sequence[FrequencySet], known: Calibration) -> None:
+def must_explain(problems: Sequence[FrequencySet], known: Calibration, complete: bool = True) -> None:
     """Complains where the balance settled, but explains nothing.
+
+    Args:
+        problems: the poses.
+        known: values.
+        complete: of a model that need not be complete only gaps are told, in which no linear law holds.
 
     Raises:
         SolveError: it leaves most of the torques.
@@ -123,23 +130,25 @@ def _check_left(problems: Sequence[FrequencySet], known: Calibration) -> None:
         values = problem.values(known)
         left = problem.torque_balance(values, problem.stiffness(values))
         share = float(np.linalg.norm(left) / np.linalg.norm(problem.pose.torques))
-        if share > UNEXPLAINED:
+        if share > UNEXPLAINED and (complete or _rattling(problem)):
+            why = _rattling(problem) or (
+                "their sign, units, joints or start values may be wrong: look at `jointscope frequency BAG --report "
+                "frf.html`; `jointscope discover` looks for a spring that the model lacks"
+            )
             raise SolveError(
-                f"{problem.pose.path}: the torque balance leaves {100.0 * share:.0f} % of the torques; {_why(problem)}"
+                f"{problem.pose.path}: the torque balance leaves {100.0 * share:.0f} % of the torques; {why}"
             )
 
 
-def _why(problem: FrequencySet) -> str:
-    """What makes a balance explain nothing: a gap that a drive rattles in, or what the robot file says."""
+def _rattling(problem: FrequencySet) -> str:
+    """Which drive rattles in a gap, which makes a balance explain nothing; "" for none."""
     values = problem.robot.values
     each = dwellings(problem.pose, problem.arm.joints, values, problem.sharpness(values))
     rattling = [one for one in each if one.rattles]
     if rattling:
         worst = max(rattling, key=lambda one: one.share / one.smooth)
         return f"{worst}; shake it where its load keeps it on one side, and take the gap from --poses"
-    return (
-        "their sign, units, joints or start values may be wrong: look at `jointscope frequency BAG --report frf.html`"
-    )
+    return ""
 
 
 def _ahead(step: Array, before: Array | None) -> Array:

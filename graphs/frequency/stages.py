@@ -22,7 +22,7 @@ from jointscope.graphs.frequency.moving_arm import moving_arm
 from jointscope.graphs.frequency.shaken_pose import ShakenPose
 from jointscope.graphs.responses.neighbouring_lines import NEIGHBOURS, neighbours, over_neighbours
 from jointscope.robots.bodies.misplaced_joints import ANGLES, LENGTHS
-from jointscope.robots.geometry.error_parameters import CUBIC, LINK_INERTIA, LINK_MASS, PAYLOAD
+from jointscope.robots.geometry.error_parameters import CUBIC, LINK_INERTIA, LINK_MASS, LINK_MOMENTS, PAYLOAD
 from jointscope.robots.geometry.flexible_arm import FlexibleArm
 from jointscope.robots.model.robot import Robot
 
@@ -31,7 +31,7 @@ Complex = NDArray[np.complex128]
 LOG_FLOOR = 0.1  # sigma of a logarithm: below it the shape of friction counts, which the matrix does not hold
 HARDENED = 2  # times the highest line: what a drive that hardens makes of two lines, and where it resonates under load
 NARROWER = 4  # times fewer lines from stage to stage
-STEP = {"length": 1e-4, "angle": 1e-4, "mass": 1e-2, "inertia": 1e-3}  # [m], [rad], [kg], [kg m2] of differences
+STEP = {"length": 1e-4, "angle": 1e-4, "mass": 1e-2, "moment": 1e-3, "inertia": 1e-3}  # SI, of differences
 
 
 def first_stage(robot: Robot, pose: ShakenPose) -> FrequencySet:
@@ -151,7 +151,7 @@ def geometry_slopes(arm: FlexibleArm, robot: Robot, pose: ShakenPose, known: Col
     """
     values = robot.values
     kinds = dict.fromkeys(LENGTHS, STEP["length"]) | dict.fromkeys(ANGLES, STEP["angle"])
-    kinds |= {LINK_MASS: STEP["mass"], LINK_INERTIA: STEP["inertia"]}
+    kinds |= {LINK_MASS: STEP["mass"], LINK_INERTIA: STEP["inertia"]} | dict.fromkeys(LINK_MOMENTS, STEP["moment"])
     steps = {f"{joint}.{part}": step for joint in robot.joints for part, step in kinds.items()} | {
         PAYLOAD: STEP["mass"]
     }

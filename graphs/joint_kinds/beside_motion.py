@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 from jointscope.factors.calibration import DYNAMICS, Calibration
 from jointscope.graphs.calibration.calibrate import calibrate
 from jointscope.graphs.calibration.calibration_result import CalibrationResult
+from jointscope.graphs.calibration.stages.near_solution import NearSolution
 from jointscope.graphs.frequency.agreement import Agreement, agreement
 from jointscope.graphs.frequency.calibrate_frequency import calibrate_frequency
 from jointscope.graphs.frequency.frequency_summary import FrequencySummary
@@ -56,7 +57,10 @@ def calibrate_beside_motion(
         JointscopeError: as of `calibrate` and `calibrate_frequency`.
     """
     began, report = time.perf_counter(), progress or (lambda text, share: None)
-    alone = calibrate_frequency(robot, shaken, lambda text, share: report(f"responses: {text}", 0.2 * share))
+    close = options.get("near") is not None
+    alone = calibrate_frequency(
+        robot, shaken, lambda text, share: report(f"responses: {text}", 0.2 * share), close, complete=not close
+    )
     summary = alone.summary.without_friction()
     for _ in range(MOST_PASSES):
         result = calibrate(robot, recordings, sets=[*sets, summary], progress=report, **options)
@@ -65,7 +69,20 @@ def calibrate_beside_motion(
         if moved(at, C, summary, there) < AGREES:
             break
         summary = there
+        if close:
+            robot, options = _from_there(robot, result), {**options, "near": _near(result, options["near"])}
     return replace(result, wall_seconds=time.perf_counter() - began)
+
+
+def _from_there(robot: Robot, result: CalibrationResult) -> Robot:
+    """The robot with the values and the noise that were found."""
+    return replace(_of_names(robot, result.robot, result.bags[0].calibration.names), noise=result.noise)
+
+
+def _near(result: CalibrationResult, before: NearSolution) -> NearSolution:
+    """Where a calibration ended, for the next one."""
+    bags = result.bags
+    return replace(before, calibrations=[bag.calibration for bag in bags], states=[bag.states for bag in bags])
 
 
 def summary_at(summary: FrequencySummary, robot: Robot) -> FrequencySummary:

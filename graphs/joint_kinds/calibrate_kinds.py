@@ -79,6 +79,7 @@ def calibrate_kinds(
     near: bool = False,
     most: int = MOST_STAGES,
     passes: int = MOST_PASSES,
+    complete: bool = True,
 ) -> KindsCalibration:
     """Calibrates an arm from both kinds.
 
@@ -90,6 +91,7 @@ def calibrate_kinds(
         near: whether the values of the robot are near the end.
         most: number of stages.
         passes: of stages and poses in turn, at the most.
+        complete: whether the model must explain most of the torques; one that lacks a spring does not.
 
     Raises:
         JointscopeError: as of both.
@@ -101,7 +103,7 @@ def calibrate_kinds(
     problems, iterations, stages = first, 0, 0
     for i in range(passes):
         before = poses
-        at = settled_stages(problems, list(poses.problems), report, near or i > 0, most)
+        at = settled_stages(problems, list(poses.problems), report, near or i > 0, most, complete)
         problems, solution = at.problems, at.solution
         iterations, stages = iterations + at.iterations, stages + at.stages
         summary = FrequencySummary.of(problems, solution.estimate.calibrations[0])

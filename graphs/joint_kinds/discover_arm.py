@@ -8,26 +8,23 @@ effects are calibrated for real, and the one that makes the recordings likeliest
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from jointscope.graphs.frequency.calibrate_frequency import calibrate_frequency
+from jointscope.factors.calibration import DYNAMICS, Calibration
 from jointscope.graphs.frequency.compare_frequency import FrequencyErrors, frequency_errors
-from jointscope.graphs.frequency.frequency_set import BAND
+from jointscope.graphs.frequency.settled_stages import must_explain
 from jointscope.graphs.joint_kinds.arm_candidates import Calibrated, arm_candidates
-from jointscope.graphs.joint_kinds.calibrate_kinds import MOST_PASSES, calibrate_kinds
 from jointscope.graphs.joint_kinds.effect_judge import ArmCandidate
+from jointscope.graphs.joint_kinds.likeliest_effect import calibrated, leading_effects, likeliest_effect
 from jointscope.graphs.joint_kinds.spring_screen import badly_explained, screened_springs
-from jointscope.graphs.poses.calibrate_poses import PoseCalibration, calibrate_poses
+from jointscope.graphs.poses.calibrate_poses import PoseCalibration
 from jointscope.graphs.poses.pose_set import PoseSet
 from jointscope.graphs.poses.tip_errors import TipErrors, summary, tip_errors, whitened
 from jointscope.graphs.poses.tracker_start import placed
-from jointscope.graphs.poses.trimmed_poses import squared_distances
-from jointscope.robots.errors import SolveError
-from jointscope.robots.geometry.added_effect import with_effect
 from jointscope.robots.geometry.arm_effects import FREQUENCY, POSES
 from jointscope.robots.model.robot import Robot
 from jointscope.robots.recordings.poses import Poses
@@ -37,9 +34,6 @@ Array = NDArray[np.float64]
 Shaken = tuple[Signals, Excitation]
 Report = Callable[[str, float], None]
 MOST_STEPS = 8
-STAGES = 8  # of a model that may lack something, which need not come to rest
-RACE = 4  # stages after which leading effects are told apart: the first with the covariance of few lines
-LEADING, NEARLY = 3, 0.3  # effects that are calibrated for real, and their evidence over that of the best one
 
 
 @dataclass(frozen=True)
@@ -123,15 +117,16 @@ def discover_arm(
     while True:
         report(f"looking for effect {len(steps) + 1}", len(steps) / (MOST_STEPS + 1))
         candidates, begins = candidates_of(result)
-        leading = _leading(candidates)
+        leading = leading_effects(candidates)
         following = None
         if leading and len(steps) < MOST_STEPS:
-            following = _best(result, leading, begins, sessions, recordings, report)
+            following = likeliest_effect(result, leading, begins, sessions, recordings, report)
             if following is None:
                 candidates = [replace(c, verdict="possible") if c in leading else c for c in candidates]
         shaken = frequency_errors(result.robot, shaken_holdout) if shaken_holdout else ()
         steps.append(ArmStep(added, result, _heldout(result.robot, holdout), shaken, tuple(candidates)))
         if following is None:
+            _must_be_explained(result)
             why = f"{MOST_STEPS} effects were added, the largest number allowed"
             if len(steps) <= MOST_STEPS:
                 why = "no effect is significant and meets left-out recordings better"
@@ -166,10 +161,19 @@ def diagnosed(
         sessions: the poses that it is calibrated with.
         recordings: the same, shaken.
         report: called with a text and the share done.
+
+    Raises:
+        SolveError: responses of which neither the model nor any effect explains anything.
     """
     candidates, begins = candidates_of(result)
     missing = [c for c in candidates if c.verdict == "missing"]
-    following = None if len(missing) < 2 else _best(result, _leading(candidates), begins, sessions, recordings, report)
+    if not missing:
+        _must_be_explained(result)
+    following = (
+        None
+        if len(missing) < 2
+        else likeliest_effect(result, leading_effects(candidates), begins, sessions, recordings, report)
+    )
     if following is None:
         return [c.beside_the_best for c in candidates]
     first, other = following[0].hypothesis.label, following[1]
@@ -198,94 +202,14 @@ def candidates_of(result: Calibrated) -> tuple[list[ArmCandidate], dict[str, Rob
     return sorted(found, key=lambda c: -c.evidence), {c.hypothesis.label: robot for c, robot in screened}
 
 
-def calibrated(
-    robot: Robot,
-    sessions: Sequence[Poses],
-    recordings: Sequence[Shaken],
-    near: bool = False,
-    most: int = STAGES,
-    passes: int = MOST_PASSES,
-) -> Calibrated:
-    """Calibrates with what there is, in one graph.
+def _must_be_explained(result: Calibrated) -> None:
+    """Complains of responses of which the model explains nothing, where no effect does.
 
-    Args:
-        robot: the model.
-        sessions: poses.
-        recordings: of the arm shaken.
-        near: whether its values are near the end.
-        most: number of stages.
-        passes: of stages and poses in turn.
+    Raises:
+        SolveError: it leaves most of the torques.
     """
-    if not recordings:
-        return Calibrated(calibrate_poses(robot, sessions), None)
-    if not sessions:
-        return Calibrated(None, calibrate_frequency(robot, recordings, near=near, most=most))
-    both = calibrate_kinds(robot, recordings, sessions, near=near, most=most, passes=passes)
-    return Calibrated(both.poses, both.frequency)
-
-
-def _leading(candidates: Sequence[ArmCandidate]) -> list[ArmCandidate]:
-    """Missing effects that may turn out to be the best one."""
-    found = sorted((c for c in candidates if c.verdict == "missing"), key=lambda c: -c.evidence)
-    return [c for c in found if c.evidence > NEARLY * found[0].evidence][:LEADING]
-
-
-def _best(
-    result: Calibrated,
-    leading: Sequence[ArmCandidate],
-    begins: Mapping[str, Robot],
-    sessions: Sequence[Poses],
-    recordings: Sequence[Shaken],
-    report: Report,
-) -> tuple[ArmCandidate, Calibrated] | None:
-    """The effect that makes the recordings likeliest, and the model with it; None where none of them does."""
-    if not recordings:
-        return leading[0], calibrated(_with(result.robot, leading[0]), sessions, ())
-    most, passes = (RACE, 1) if len(leading) > 1 else (STAGES, MOST_PASSES)
-    found = []
-    for candidate in leading:
-        report(f"calibrating with {candidate.hypothesis.label}", 0.5)
-        begin = begins.get(candidate.hypothesis.label) or _with(result.robot, candidate)
-        try:
-            other = calibrated(begin, sessions, recordings, True, most, passes)
-        except SolveError:
-            continue  # an effect that takes the place of another one may have no end
-        looks = 2.0 * float(np.log(max(len(candidate.hypothesis.kind.orders), 1)))
-        found.append((_unlikely(other, result) + looks, candidate, other))
-    if not found:
-        return None
-    _, candidate, other = min(found, key=lambda each: each[0])
-    if most < STAGES:
-        other = calibrated(other.robot, sessions, recordings, near=True)
-    return (candidate, other) if _unlikely(other, result) < _unlikely(result, result) else None
-
-
-def _unlikely(result: Calibrated, base: Calibrated) -> float:
-    """Minus twice the logarithm of the likelihood of all recordings, but for a constant.
-
-    A band of neighbouring lines counts as one; of poses the size of the noise is open, its shape is that of `base`.
-    """
-    total = 0.0
     if result.frequency is not None:
-        total += sum(problem.stage.unlikely for problem in result.frequency.problems) / BAND
-    if result.poses is not None and base.poses is not None:
-        pairs = zip(base.poses.problems, result.poses.problems, result.poses.calibrations, strict=True)
-        squares = [
-            squared_distances(replace(p, robot=replace(own.robot, poses=p.robot.poses)), c).sum() for p, own, c in pairs
-        ]
-        total += sum(problem.measured for problem in base.poses.problems) * float(np.log(sum(squares)))
-    return total
-
-
-def _with(robot: Robot, found: ArmCandidate) -> Robot:
-    """The robot with an effect, beginning at the sizes that were seen."""
-    hypothesis = found.hypothesis
-    if hypothesis.kind.soft:
-        largest = max(found.sizes)
-        sizes = [1.0 / max(size, 0.1 * largest) for size in found.sizes]
-    else:
-        sizes = list(found.sizes)
-    return with_effect(robot, hypothesis, dict(zip(hypothesis.names, sizes, strict=True)))
+        must_explain(result.frequency.problems, Calibration.of(result.robot).only([DYNAMICS]))
 
 
 def _heldout(robot: Robot, holdout: Sequence[Poses]) -> TipErrors | None:

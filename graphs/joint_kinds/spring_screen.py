@@ -3,8 +3,9 @@
 
 A joint or bearing that gives way with its resonance among the lines drives all other springs to values that have no
 meaning, and from there its own slope is not the way back; nor is that of a drive that hardens so much that it has
-another stiffness in every pose. So each spring of a joint that is locked, and the hardening of each drive, is put in at
-the values with which the calibration began, and a few stages are solved: how much likelier the recordings become tells.
+another stiffness in every pose. So each spring that a joint may have beside its drive, and the hardening of each drive,
+is put in at the values with which the calibration began, and a few stages are solved: how much likelier the recordings
+become tells.
 """
 
 from __future__ import annotations
@@ -42,7 +43,7 @@ def badly_explained(found: Explained) -> bool:
 def screened_springs(
     result: FrequencyCalibration, candidates: Sequence[ArmCandidate]
 ) -> list[tuple[ArmCandidate, Robot]]:
-    """Springs of locked joints, and drives that harden, that make the recordings likelier, best first.
+    """Springs of locked joints and of bearings, and drives that harden, that make the recordings likelier, best first.
 
     Each has a robot that begins with it.
 
@@ -72,7 +73,7 @@ def screened_springs(
 def _is_tried(hypothesis: ArmHypothesis, shaken: Sequence[str]) -> bool:
     if hypothesis.names == (f"{hypothesis.owner}.{CUBIC}",):
         return hypothesis.owner in shaken
-    return hypothesis.kind.soft and hypothesis.owner not in shaken
+    return hypothesis.kind.soft
 
 
 def _begin(robot: Robot, hypothesis: ArmHypothesis) -> float:

@@ -1,13 +1,13 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """What makes an arm at rest differ from a rigid one with perfect encoders, joint by joint.
 
-    q_j = q_motor_j + r_j(q_motor_j) - a_j(q_motor_j) + e_j + x_j - sign(g_j) w_j
+    q_j = q_motor_j + r_j(q_motor_j) - a_j(q_motor_j) + e_j + x_j - sign(g_j) (w_j - h_j)
     r, a = c cos(o q_motor) + s sin(o q_motor)
     k x + k3 x^3 = g,    beta = g_beta / k_beta
 
 a is the eccentricity of an encoder, what its reading has too much as in the catalogue (o = 1 unless a parameter says
 otherwise), r the ripple of a gear (o waves per turn), e is what the transmission does unseen, g the torque of gravity,
-w the backlash as Neubauer et al. (2015, eq. 18) have it.
+w the backlash as Neubauer et al. (2015, eq. 18) have it, h half of the gap as springs in motion have it.
 """
 
 from __future__ import annotations
@@ -18,7 +18,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from jointscope.robots.geometry.arm_chain import ChainPoint
-from jointscope.robots.geometry.error_parameters import BACKLASH, BEARING, CUBIC, RIPPLE, STIFFNESS, WAVES, WAVES_ORDER
+from jointscope.robots.geometry.error_parameters import (
+    BACKLASH,
+    BEARING,
+    CUBIC,
+    HALF_GAP,
+    RIPPLE,
+    STIFFNESS,
+    WAVES,
+    WAVES_ORDER,
+)
 
 Array = NDArray[np.float64]
 ROOTS = 12  # Newton steps to the deflection of a spring that hardens
@@ -35,7 +44,8 @@ class WhatGivesWay:
     def __init__(self, joints: Sequence[str], values: Mapping[str, float]):
         self._joints, self._values = tuple(joints), values
         self._drives = self._there(STIFFNESS)
-        self._gaps = self._there(BACKLASH)
+        self._gaps = [(j, name, -1.0) for j, name in self._there(BACKLASH).items()]
+        self._gaps += [(j, name, 1.0) for j, name in self._there(HALF_GAP).items()]
         self._bearings = {(j, axis): name for axis, part in enumerate(BEARING) for j, name in self._there(part).items()}
 
     @property
@@ -56,8 +66,8 @@ class WhatGivesWay:
         turn, tilt = np.zeros_like(point.gravity), np.zeros_like(point.bearing_gravity)
         for j in self._drives:
             turn[:, j] = self._stretch(j, point.gravity[:, j])[0]
-        for j, name in self._gaps.items():
-            turn[:, j] -= np.sign(point.gravity[:, j]) * self._values[name]
+        for j, name, sign in self._gaps:
+            turn[:, j] += sign * np.sign(point.gravity[:, j]) * self._values[name]
         for (j, axis), name in self._bearings.items():
             tilt[:, j, axis] = point.bearing_gravity[:, j, axis] / self._values[name]
         return turn, tilt
@@ -96,8 +106,8 @@ class WhatGivesWay:
             found[name] = -by_yield[:, :, j] * (x * slope)[:, None]
             if j in cubic:
                 found[cubic[j]] = -by_yield[:, :, j] * (x**3 * slope)[:, None]
-        for j, name in self._gaps.items():
-            found[name] = -by_yield[:, :, j] * np.sign(point.gravity[:, j])[:, None]
+        for j, name, sign in self._gaps:
+            found[name] = sign * by_yield[:, :, j] * np.sign(point.gravity[:, j])[:, None]
         for (j, axis), name in self._bearings.items():
             tilt = point.bearing_gravity[:, j, axis] / self._values[name] / self._values[name]  # a trial may be huge
             found[name] = -by_yield[:, :, n * (1 + axis) + j] * tilt[:, None]

@@ -32,6 +32,14 @@ class InertiaEffect(Effect):
     change: Callable[[Array], dict[str, Array]] = field(repr=False)
     last_only: bool = False
 
+    def joint_of(self, robot: RobotView, owner: str) -> str:
+        """The joint whose body changes."""
+        return owner
+
+    def change_at(self, robot: RobotView, owner: str, body: Array) -> dict[str, Array]:
+        """As `change`, of the instance at one owner."""
+        return self.change(body)
+
     def owners_of(self, robot: RobotView) -> tuple[str, ...]:
         """Joints whose links have an equation of their own, beside those of rotors; all of them, or the last joint."""
         owners = (joint for joint in super().owners_of(robot) if joint not in robot.tree.massless)

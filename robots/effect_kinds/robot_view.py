@@ -9,6 +9,7 @@ from typing import Protocol
 from jointscope.robots.bodies.rigid_tree import RigidTree
 from jointscope.robots.parts.model_choices import ModelChoices
 from jointscope.robots.parts.parameter import Parameter
+from jointscope.robots.parts.pose_setup import PoseSetup
 from jointscope.robots.parts.position_target import PositionTarget
 from jointscope.robots.parts.sensors import Accelerometer, Gyro, LinkEncoder, MotorEncoder, Topic
 
@@ -43,6 +44,10 @@ class RobotView(Protocol):
     @property
     def command(self) -> Topic:
         """Where the commands are, and their unit."""
+
+    @property
+    def poses(self) -> PoseSetup | None:
+        """What is measured of the arm at rest; None where nothing is."""
 
     @property
     def gyros(self) -> Sequence[Gyro]:

@@ -70,6 +70,7 @@ EFFECT = LinkMass(
         look_alikes={
             "load_scale": "a load that is always the same is a mass of the link that it hangs on",
             "torque_constant_error": "a drive that makes less torque is as one that moves heavier links",
+            "payload": "a load at the tool that is always there is a mass of the link that carries it",
             "inertia_error": "where little gravity acts, a heavier link is one with more inertia",
             "gravity_imbalance": "at one joint a wrong first moment is a weight that turns with the angle",
             "axis_misalignment": "a first moment of a link is one whose centre of mass stands askew",

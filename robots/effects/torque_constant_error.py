@@ -48,6 +48,7 @@ EFFECT = TorqueConstantError(
         typical="3 to 15 % of a torque constant from a data sheet",
         excitation="motion under loads that are known: links whose masses the model knows, in several postures",
         look_alikes={
+            "payload": "where rotors' inertias are not known, a load scales torques as a drive does",
             "load_scale": "known loads that are larger than said ask a drive for more torque",
             "link_mass": "with all inertias of a joint free, only their scale against known masses tells the constant",
             "command_limit": "where most of the command is beyond the limit, it is worth less",

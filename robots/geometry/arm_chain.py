@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from jointscope.robots.bodies.misplaced_joints import ANGLES, LENGTHS, across, turned
 from jointscope.robots.bodies.rigid_tree import RigidTree
 from jointscope.robots.errors import RobotError
-from jointscope.robots.geometry.error_parameters import LINK_MASS, PAYLOAD, TOOL
+from jointscope.robots.geometry.error_parameters import LINK_MASS, LINK_MOMENTS, PAYLOAD, TOOL
 from jointscope.robots.urdf.motion_axis import motion_axis
 
 Array = NDArray[np.float64]
@@ -172,6 +172,8 @@ class ArmChain:
         masses = self._masses + np.array([values.get(f"{joint}.{LINK_MASS}", 0.0) for joint in self.joints])
         payload = values.get(PAYLOAD, 0.0)
         weights = masses[:, None, None] * centres
+        for j, joint in enumerate(self.joints):
+            weights[j] += frames[j] @ np.array([values.get(f"{joint}.{part}", 0.0) for part in LINK_MOMENTS])
         weights[self.level] += payload * target
         masses[self.level] += payload
         carried = np.cumsum(masses[::-1])[::-1]

@@ -14,6 +14,7 @@ from jointscope.robots.geometry.error_parameters import (
     BACKLASH,
     BEARING,
     CUBIC,
+    HALF_GAP,
     LINK_INERTIA,
     LINK_MASS,
     LOAD_FRICTION,
@@ -47,6 +48,7 @@ class ArmEffectKind:
         of_motor: whether it acts on a motor that must be shaken.
         orders: waves per turn that are looked at; the best one counts, as one of so many.
         unseen: kinds of recordings in which it does nothing that counts, and why.
+        catalogue: what motion calls its one parameter at a joint where that has another name and sign, and the factor.
     """
 
     id: str
@@ -59,6 +61,7 @@ class ArmEffectKind:
     of_motor: bool = False
     orders: tuple[int, ...] = ()
     unseen: Mapping[str, str] = field(default_factory=dict)
+    catalogue: tuple[str, float] = ("", 1.0)
 
     def parameters(self, owner: str) -> tuple[str, ...]:
         """Full names of its parameters."""
@@ -76,6 +79,7 @@ KINDS = (
         "rad",
         5e-4,
         unseen={FREQUENCY: "a drive that rattles in its gap answers otherwise at every size of the excitation"},
+        catalogue=(HALF_GAP, -1.0),
     ),
     ArmEffectKind("spring_cubic", (CUBIC,), "N m/rad^3", 1e11, needs_spring=True),
     ArmEffectKind("payload", (), "kg", 3.0, (PAYLOAD,), needs_spring=True),
@@ -109,6 +113,11 @@ class ArmHypothesis:
         """Full names of its parameters."""
         return self.kind.parameters(self.owner)
 
+    @property
+    def catalogue_names(self) -> tuple[str, ...]:
+        """What motion calls them."""
+        return (f"{self.owner}.{self.kind.catalogue[0]}",) if self.kind.catalogue[0] else self.names
+
 
 def hypotheses(
     joints: Sequence[str], known: Collection[str], tracked: bool, shaken: Sequence[str] | None = None
@@ -138,7 +147,7 @@ def hypotheses(
         else:
             owners = [joints[i] for i in springs] if kind.needs_spring else joints
         found += [ArmHypothesis(kind, owner) for owner in owners]
-    return [h for h in found if not any(name in known for name in h.names)]
+    return [h for h in found if not any(name in known for name in (*h.names, *h.catalogue_names))]
 
 
 def effect_units(joints: Sequence[str]) -> dict[str, str]:

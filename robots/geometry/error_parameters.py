@@ -14,7 +14,8 @@ from jointscope.robots.bodies.misplaced_joints import ANGLES, LENGTHS, misplacem
 from jointscope.robots.parts.parameter import Parameter
 
 TRACKER, TOOL = "tracker", "tool"
-BACKLASH = "backlash"
+BACKLASH = "backlash"  # w of Neubauer et al. (2015), eq. 18: minus half of the gap
+HALF_GAP = "backlash.half_gap"  # the same gap as motion has it, -w
 WAVES = ("encoder_eccentricity.cos", "encoder_eccentricity.sin")  # of what an encoder reads too much
 WAVES_ORDER = "encoder_eccentricity.order"  # periods per turn of the joint; one where it is no parameter
 RIPPLE = ("gear_ripple.cos", "gear_ripple.sin", "gear_ripple.order")  # of a gear's error, `order` times per turn
@@ -24,7 +25,8 @@ BEARING = ("bearing.stiffness_x", "bearing.stiffness_y")
 DAMPING = "damping"  # of a drive
 TILT_DAMPING = ("bearing.damping_x", "bearing.damping_y")
 PAYLOAD = "robot.payload.mass"  # a point at the target, which the URDF does not know
-LINK_MASS = "link_mass.mass"  # what the link behind a joint weighs more than in the URDF, at its centre of mass
+LINK_MASS = "link_mass.mass"  # what the link behind a joint weighs more than in the URDF, of its own material
+LINK_MOMENTS = tuple(f"link_mass.{axis}" for axis in "xyz")  # first moments more than that, in the axes of the link
 LINK_INERTIA = "inertia_error.about_axis"  # of the link behind a joint, more than in the URDF, about the joint's axis
 TORQUE_SHARE = "torque_constant_error.share"  # motors make 1 + share of the torque that they say
 TORQUE_DELAY = "robot.torque_delay.seconds"  # by which torques are said too late

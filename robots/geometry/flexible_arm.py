@@ -27,6 +27,7 @@ from jointscope.robots.geometry.error_parameters import (
     DAMPING,
     LINK_INERTIA,
     LINK_MASS,
+    LINK_MOMENTS,
     PAYLOAD,
     STIFFNESS,
     TILT_DAMPING,
@@ -209,8 +210,14 @@ def _hinge(axis: Array) -> pin.JointModelRevoluteUnaligned:
 
 
 def _with_masses(body: pin.Inertia, name: str, along: Array, values: Mapping[str, float]) -> pin.Inertia:
-    """A link that weighs more than in the URDF, at its centre of mass, and that has more inertia about its joint."""
+    """A link of more of its own material than the URDF says, other first moments, more inertia about its joint."""
     mass, more = values.get(f"{name}.{LINK_MASS}", 0.0), values.get(f"{name}.{LINK_INERTIA}", 0.0)
-    if not mass and not more:
+    moments = np.array([values.get(f"{name}.{part}", 0.0) for part in LINK_MOMENTS])
+    if not (mass or more or np.any(moments)):
         return body
-    return pin.Inertia(body.mass + mass, np.array(body.lever), np.array(body.inertia) + more * np.outer(along, along))
+    found = np.array(body.toDynamicParameters())
+    found += mass * (found / body.mass if body.mass > 0.0 else np.eye(10)[0])
+    found[1:4] += moments
+    about = more * np.outer(along, along)
+    found[4:] += about[[0, 0, 1, 0, 1, 2], [0, 1, 1, 2, 2, 2]]
+    return pin.Inertia.FromDynamicParameters(found)

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from jointscope.robots.bodies.misplaced_joints import ANGLES, LENGTHS
 from jointscope.robots.geometry.arm_chain import ChainPoint, cross
-from jointscope.robots.geometry.error_parameters import LINK_MASS, PAYLOAD, TOOL
+from jointscope.robots.geometry.error_parameters import LINK_MASS, LINK_MOMENTS, PAYLOAD, TOOL
 
 Array = NDArray[np.float64]
 YIELDING = (2, 4, 3)  # the joint, x', y' among the turns at a joint: what gives way under its torque
@@ -60,6 +60,8 @@ def gravity_slopes(joints: Sequence[str], point: ChainPoint, g: Array) -> Gravit
             found[f"{joint}.{part}"] = moved * _along(levers, point.steps[f"{joint}.{part}"])
         away = point.centres[:, j, None] - point.origins[:, owner]
         found[f"{joint}.{LINK_MASS}"] = np.where(owner <= j, np.sum(levers * away, axis=2), 0.0)
+        for k, part in enumerate(LINK_MOMENTS):
+            found[f"{joint}.{part}"] = np.where(owner <= j, _along(levers, point.frames[:, j, :, k]), 0.0)
     carrying = owner <= point.level  # of the target
     for part in LENGTHS:
         found[f"{TOOL}.{part}"] = point.payload * carrying * _along(levers, point.steps[f"{TOOL}.{part}"])

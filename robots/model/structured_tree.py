@@ -21,13 +21,13 @@ from jointscope.robots.bodies.rigid_tree import RigidTree
 from jointscope.robots.bodies.turned_gravity import turned_gravity
 from jointscope.robots.effect_kinds.inertia_effect import InertiaEffect, about_origin
 from jointscope.robots.effect_kinds.structure import Structure
+from jointscope.robots.model.displaced_bodies import DisplacedBodies
 from jointscope.robots.model.turned_axes import TurnedAxis, across_axes
 
 if TYPE_CHECKING:
     from jointscope.robots.model.robot import Robot
 
 Array = NDArray[np.float64]
-DISPLACED = 1e-4  # [m], [rad] to both sides, over which torques are compared
 ENTRIES = ((0, 0), (0, 1), (1, 1), (0, 2), (1, 2), (2, 2))  # of an inertia in pinocchio's dynamic parameters
 
 
@@ -82,6 +82,7 @@ class StructuredTree:
         self._geometry = [*(name for axis in self._turned for name in axis.names), *self._misplaced]
         self._own = (*of_bodies, *self._tilt, *self._geometry)
         self._cache: tuple[tuple[float, ...], RigidTree] | None = None
+        self._displaced = DisplacedBodies(self._geometry, self._own, self._with_values)
 
     @property
     def varies(self) -> bool:
@@ -125,7 +126,7 @@ class StructuredTree:
             torques = tilt_torques(self.kinematics, tree, q, np.array([values[name] for name in self._tilt]))
             for name, torque in zip(self._tilt, torques, strict=True):
                 found[name] = -np.einsum("kij,kj->ki", M_inverse, torque)
-        for name, torque in self._torques_of_geometry(tree, (q, v, a), scale, values):
+        for name, torque in self._displaced.torques(tree, (q, v, a), scale, values):
             found[name] = -np.einsum("kij,kj->ki", M_inverse, torque)
         if self.coriolis_scale is not None:
             found[self.coriolis_scale] = tree.acceleration(q, v, tau) - tree.acceleration(q, np.zeros_like(v), tau)
@@ -139,19 +140,7 @@ class StructuredTree:
         if self._tilt:
             torques = tilt_torques(self.kinematics, tree, q, np.array([values[name] for name in self._tilt]))
             found |= dict(zip(self._tilt, torques, strict=True))
-        return found | dict(self._torques_of_geometry(tree, (q, still, still), 0.0, values))
-
-    def _torques_of_geometry(
-        self, tree: RigidTree, motion: tuple[Array, Array, Array], coriolis: float, values: Mapping[str, float]
-    ) -> Iterator[tuple[str, Array]]:
-        """Torque that a unit of each error of the geometry asks for, shape (m, n_link) each."""
-        q, v, a = motion
-        shares = {1.0: coriolis, 0.0: 1.0 - coriolis} if tree.coriolis else {0.0: 1.0}  # by speed
-        used = [(speed * v, share) for speed, share in shares.items() if share]
-        for name in self._geometry:
-            ends = [self._with_values({**values, name: values[name] + step}) for step in (DISPLACED, -DISPLACED)]
-            ahead, behind = (sum(share * end.torque(q, w, a) for w, share in used) for end in ends)
-            yield name, np.asarray(ahead - behind) / (2.0 * DISPLACED)
+        return found | dict(self._displaced.torques(tree, (q, still, still), 0.0, values))
 
     @staticmethod
     def _torques_of(
@@ -235,8 +224,9 @@ def inertia_changes(robot: Robot, model: pin.Model) -> list[InertiaChange]:
     for here in robot.effects:
         joint = model.getJointId(here.owner) if model.existJointName(here.owner) else 0
         if isinstance(here.effect, InertiaEffect):
+            joint = model.getJointId(here.effect.joint_of(robot, here.owner))
             present = model.inertias[joint].toDynamicParameters()
-            for name, direction in here.effect.change(present).items():
+            for name, direction in here.effect.change_at(robot, here.owner, present).items():
                 found.append(InertiaChange(here.parameter(name), joint, np.asarray(direction, float)))
         elif _form(here.effect) == "bearing":
             present = inertia_about_joint(model, joint)

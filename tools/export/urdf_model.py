@@ -98,7 +98,8 @@ def _sag(robot: Robot) -> dict[str, str]:
 
 def _change_bodies(robot: Robot, joints: Mapping[str, ET.Element], links: Mapping[str, ET.Element]) -> None:
     """Adds to the inertias of links what effects found."""
-    owners = {here.owner for here in robot.effects if isinstance(here.effect, InertiaEffect)}
+    changing = [(here.effect, here.owner) for here in robot.effects]
+    owners = {e.joint_of(robot, owner) for e, owner in changing if isinstance(e, InertiaEffect)}
     model = robot.tree.model
     for change in inertia_changes(robot, model):
         name = model.names[change.joint]

@@ -22,6 +22,7 @@ EXAMPLES = {
     "target": "target",
     "link encoders": "link_encoder",
     "upright robot": "robot (upright)",
+    "robot with a target": "robot (with poses)",
     "weighed elastic joint": "joint1 (elastic, under gravity)",
 }
 WIDTH = 100

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from jointscope.factors.calibration import Calibration
 from jointscope.graphs.calibration.stages.convergence_asked import must_converge
 from jointscope.graphs.calibration.stages.history import History
+from jointscope.graphs.calibration.stages.near_solution import NearSolution
 from jointscope.graphs.calibration.stages.solved import Solved
 from jointscope.graphs.calibration.stages.solved_windows import anchored, noise_windows
 from jointscope.graphs.noise.noise_estimation import FixedPoint, densities, not_below, scaled
@@ -66,6 +67,7 @@ class WholeStage:
         sets: recordings of other kinds, which share the values of the motions from here on.
         stated: sigmas of encoders before any was found anew, by sensor, shape (n,) each; those at hand where empty.
         agrees: relative difference of noise and residuals that asks for no further pass.
+        near: a point near the solution; None where states come from the measurements.
     """
 
     hold: tuple[str, ...]
@@ -76,6 +78,7 @@ class WholeStage:
     sets: Sequence[SetProblem] = ()
     stated: Mapping[str, Array] = field(default_factory=dict)
     agrees: float = NOISE_AGREES
+    near: NearSolution | None = None
 
     def solve(self, problems: Sequence[BagProblem], noise: ProcessNoise, calibrations: Sequence[Calibration]) -> Solved:
         """First with looser noise, then with the estimated one, checked against the whole."""
@@ -84,7 +87,9 @@ class WholeStage:
     def approached(
         self, problems: Sequence[BagProblem], noise: ProcessNoise, calibrations: Sequence[Calibration]
     ) -> Estimate:
-        """Where looser noise and blunter friction lead from the values that windows found."""
+        """Where looser noise and blunter friction lead from the values that windows found; near states are kept."""
+        if self.near is not None and (states := self.near.states_of(problems)):
+            return self.with_sets(Estimate(tuple(states), tuple(calibrations)))
         blunt = blunt_sharpness(problems[0].robot, [p.recording for p in problems])
         softer = [anchored([blunted(p, sharpness) for p in problems], calibrations) for sharpness in blunt]
         estimate = approach(softer[0] if softer else problems, noise, calibrations, self.hold)

@@ -22,8 +22,9 @@ def inertia_columns(hypothesis: EffectHypothesis, s: ScoreSignals) -> list[Colum
     """One column of accelerations for each size."""
     effect, tree, layout = hypothesis.here.effect, s.robot.kinematic_tree, s.model.layout
     assert isinstance(effect, InertiaEffect)
-    joint = tree.model.getJointId(hypothesis.here.owner)
-    directions = effect.change(tree.model.inertias[joint].toDynamicParameters())
+    owner = hypothesis.here.owner
+    joint = tree.model.getJointId(effect.joint_of(s.robot, owner))
+    directions = effect.change_at(s.robot, owner, tree.model.inertias[joint].toDynamicParameters())
     q, v = s.x[:, layout.q_link], s.x[:, layout.v_link]
     changes = [InertiaChange(size.name, joint, np.asarray(directions[size.name], float)) for size in hypothesis.sizes]
     return _against(inertia_torques(tree, changes, q, v, s.a_link, 1.0), s)

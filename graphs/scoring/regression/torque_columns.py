@@ -95,8 +95,9 @@ class TorqueColumns:
         label, effect, tree = hypothesis.label, hypothesis.here.effect, self.robot.tree
         assert isinstance(effect, InertiaEffect)
         if label not in self._by_label:
-            body = tree.model.getJointId(hypothesis.here.owner)
-            directions = effect.change(tree.model.inertias[body].toDynamicParameters())
+            owner = hypothesis.here.owner
+            body = tree.model.getJointId(effect.joint_of(self.robot, owner))
+            directions = effect.change_at(self.robot, owner, tree.model.inertias[body].toDynamicParameters())
             changes = [InertiaChange(s.name, body, np.asarray(directions[s.name], float)) for s in hypothesis.sizes]
             self._by_label[label] = inertia_torques(tree, changes, self.cells.q, self._v, self.cells.a, 1.0)
         return self._by_label[label]

@@ -9,7 +9,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from lever_bench import C0, hanging, lever, lever_in_sight
+from lever_of_all_kinds import Lever
 
+import jointscope as js
 from jointscope import simulate
 from jointscope.factors.calibration import Calibration
 from jointscope.graphs.across_kinds.discover_kinds import NOTHING_LEFT, discover_kinds, leading
@@ -151,6 +153,46 @@ def test_the_command_writes_the_model_its_steps_and_its_page(rod, tmp_path, caps
     assert {each["kind"] for each in content["recordings"]} == {"bags", "rests"}
     share = load_robot(out).parameters["robot.load_scale.share"]
     assert abs(share.value - (1.0 / 0.9 - 1.0)) < 3.0 * share.sigma
+
+
+@pytest.mark.slow
+def test_four_kinds_find_one_load_that_responses_alone_are_led_astray_by(tmp_path):
+    lever, kinds = Lever(tmp_path, load=0.3), ("motion", "poses", "rests", "frequency")
+    found = discover_kinds(lever.robot, lever.recordings(*kinds), lever.held(*kinds), missing_torque=False)
+    assert labels(found) == {"payload@robot"} and found.adequate
+    (step,) = found.steps[1:]
+    assert {"motion", "rests"} <= {*step.added.shown_by} and step.added.against == ()
+    mass = found.robot.parameters["robot.payload.mass"]
+    assert abs(mass.value - 0.3) < 3.0 * mass.sigma and mass.sigma < 1e-5
+    for name in ("swing.stiffness", "swing.damping", "swing.coulomb_torque", "swing.motor_viscous.coefficient"):
+        assert value(found.robot, name, lever.truth[name]), name
+    (first, held_first), (last, held_last) = found.errors
+    assert set(first) == set(kinds) and all(last[kind] < first[kind] for kind in kinds)
+    assert all(held_last[kind] < held_first[kind] for kind in ("motion", "poses", "rests"))
+    # what the last model is, as a graph for a user
+    assert js.graph(found.steps[-1].model.motion.result).graph.size() < 40
+
+
+@pytest.mark.slow
+def test_a_torque_constant_of_an_elastic_drive_is_one_number_of_motion_and_rests_beside_poses(tmp_path):
+    lever, share = Lever(tmp_path), 0.05
+    poses, own, others = lever.seen(), lever.hanging(), lever.hanging(20, 17)
+    rests, held = (replace(r, u=r.u / (1.0 + share)) for r in (own, others))
+    lever.effects = [f"torque_constant_error@swing:share={share}"]
+    given = KindsRecordings((lever.moved(),), (poses,), rests=(rests,))
+    found = discover_kinds(lever.robot, given, KindsRecordings(rests=(held,)), missing_torque=False)
+    assert labels(found) == {"torque_constant_error@swing"} and found.adequate
+    assert found.steps[1].added.shown_by == ("motion", "rests")
+    p = found.robot.parameters["swing.torque_constant_error.share"]
+    assert value(found.robot, p.name, share) and abs(p.value - share) < 1e-4
+    assert found.errors[-1][1]["rests"] < 1.2
+
+
+@pytest.mark.slow
+def test_nothing_comes_into_a_true_model_of_four_kinds(tmp_path):
+    lever, kinds = Lever(tmp_path), ("motion", "poses", "rests", "frequency")
+    found = discover_kinds(lever.robot, lever.recordings(*kinds), missing_torque=False)
+    assert len(found.steps) == 1 and found.adequate
 
 
 def test_recordings_of_one_graph_are_sent_where_they_belong(rod):

@@ -3,6 +3,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import pytest
 
 from jointscope.graphs.across_kinds.said_by_kinds import Said, across_kinds, unseen_by_arm
@@ -65,3 +67,42 @@ def test_effects_of_motion_that_do_nothing_in_poses_are_untestable_by_them():
     found = unseen_by_arm(["torque_delay@robot", "payload@robot", "cogging@j"], ["poses", "frequency"])
     assert set(found) == {"poses"} and set(found["poses"]) == {"torque_delay@robot"}
     assert found["poses"]["torque_delay@robot"].why == "nothing moves at rest"
+
+
+def test_steps_from_a_model_that_explains_little_speak_against_nothing():
+    by_kind = {
+        "motion": {"payload@robot": Said("missing", {"mass": (0.3, 1e-3, "kg")})},
+        "frequency": {"payload@robot": Said("possible", {"mass": (0.03, 1e-3, "kg")}, sure=False)},
+    }
+    (found,) = across_kinds(by_kind)
+    assert found.verdict == "missing" and found.against == ()
+    by_kind["frequency"]["payload@robot"] = replace(by_kind["frequency"]["payload@robot"], sure=True)
+    (found,) = across_kinds(by_kind)
+    assert found.verdict == "possible" and found.against == ("frequency",)
+
+
+def test_what_such_a_model_shows_is_no_objection_but_others_speak_against_it():
+    unsure = Said("missing", {"share": (0.008, 1e-3, "1")}, sure=False)
+    motion = Said("absent", {"share": (0.0, 1e-5, "1")})
+    (found,) = across_kinds(
+        {"motion": {"torque_constant_error@j": motion}, "frequency": {"torque_constant_error@j": unsure}}
+    )
+    assert found.verdict == "possible" and found.against == ("motion",)
+
+
+def test_of_two_effects_that_explain_each_other_the_one_with_more_evidence_is_missing():
+    sizes = {"mass": (0.3, 1e-3, "kg")}
+    payload = {
+        "motion": Said("missing", sizes, ("link_mass@j",), evidence=90.0),
+        "rests": Said("missing", sizes, ("link_mass@j",), evidence=50.0),
+        "frequency": Said("possible", {}, ("link_mass@j",)),
+    }
+    mass = {
+        "motion": Said("missing", {"mass": (0.7, 1e-3, "kg")}, ("payload@robot",), evidence=80.0),
+        "rests": Said("possible", {}, ("payload@robot",)),
+        "frequency": Said("missing", {"mass": (0.7, 1e-2, "kg")}, ("payload@robot",), evidence=10.0),
+    }
+    kinds = {k: {"payload@robot": payload[k], "link_mass@j": mass[k]} for k in payload}
+    found = {c.label: c for c in across_kinds(kinds)}
+    assert found["payload@robot"].explained_by == "" and found["payload@robot"].verdict == "missing"
+    assert found["link_mass@j"].explained_by == "payload@robot"

@@ -10,7 +10,8 @@ import pytest
 from shaken_arm import TX90L
 
 from jointscope.graphs.joint_kinds.arm_candidates import arm_candidates
-from jointscope.graphs.joint_kinds.discover_arm import calibrated, discover_arm
+from jointscope.graphs.joint_kinds.discover_arm import discover_arm
+from jointscope.graphs.joint_kinds.likeliest_effect import calibrated
 from jointscope.robots.files.robot_file import load_robot
 from jointscope.robots.geometry.arm_effects import FREQUENCY, KINDS, POSES, hypotheses
 from jointscope.tools.bags.at_poses.read_poses import read_poses

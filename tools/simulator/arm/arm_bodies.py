@@ -118,6 +118,7 @@ class ArmBodies:
         parent, found, bodies = spec.worldbody, {}, dict[int, Any]()
         for j in range(1, tree.model.njoints):
             name, inertia = tree.model.names[j], tree.model.inertias[j]
+            more = 1.0 + self.size("link_mass", name, "mass") / max(inertia.mass, 1e-9)  # of the same material
             place, (axis, _) = tree.model.jointPlacements[j], joint_axis(tree.model, j)
             x = np.eye(3)[1] if abs(axis[0]) > 0.9 else np.eye(3)[0]
             y = np.cross(axis, x)
@@ -129,9 +130,9 @@ class ArmBodies:
                 pos=place.translation + shift,
                 quat=quaternion_wxyz(turn),
                 explicitinertial=True,
-                mass=max(inertia.mass + self.size("link_mass", name, "mass"), 1e-9),
+                mass=max(inertia.mass * more, 1e-9),
                 ipos=inertia.lever,
-                fullinertia=full_inertia(inertia.inertia + 1e-9 * np.eye(3)),
+                fullinertia=full_inertia(inertia.inertia * more + 1e-9 * np.eye(3)),
             )
             bodies[j] = parent
             if name not in welded or name in giving:

@@ -19,7 +19,7 @@ DEFAULTS: Mapping[str, Mapping[str, float]] = {
     "joint_elasticity": {"compliance": 4.0e-5},  # [rad/(N m)] of a joint without a stiffness in the robot file
     "bearing_flexibility": {"compliance_x": 5.0e-6, "compliance_y": 5.0e-6},  # [rad/(N m)] beside the robot file's
     "payload": {"mass": 2.0},  # [kg] at the target
-    "link_mass": {"mass": 2.0},  # [kg] more than in the URDF, at the centre of mass of the link behind the joint
+    "link_mass": {"mass": 2.0},  # [kg] more of the link's own material than in the URDF
     "torque_constant_error": {"share": 0.05},  # motors make that much more torque than they say
     "motor_stribeck": {"torque": 6.0, "velocity": 0.02},  # [N m], [rad/s] dry friction's breakaway; nothing at rest
     "load_dependent_friction": {"coefficient": 0.03},  # of what the drive passes on, as dry friction; nothing at rest

@@ -52,7 +52,7 @@ class SimulatedEffect:
         parameters: all values by name.
         id: name of the effect, that of its file.
         acts_on: kinds of owners, of "joint", "elastic joint", "last joint", "imu", "target", "robot", "upright robot",
-            "link encoders" and "weighed elastic joint".
+            "robot with a target", "link encoders" and "weighed elastic joint".
         defaults: parameters with their sizes; an effect without fixed ones overrides `default_parameters`.
         null: the value of a size at which the effect vanishes; zero but for ratios.
         never_negative: parameters that must not be negative.
@@ -204,7 +204,8 @@ def owners_of(kind: str, robot: Robot) -> tuple[str, ...]:
     seen = robot.joints if robot.link_encoder is not None else ()
     joints["joint seen on the link"] = tuple(f"{joint}{LINK_SIDE}" for joint in seen)
     joints["weighed elastic joint"] = elastic if robot.tree.gravity.any() else ()
-    return {**joints, "robot": ("robot",), "upright robot": upright}[kind]
+    seen_at_rest = ("robot",) if robot.poses is not None else ()
+    return {**joints, "robot": ("robot",), "upright robot": upright, "robot with a target": seen_at_rest}[kind]
 
 
 def _one_of(kinds: Sequence[str]) -> str:

@@ -43,12 +43,8 @@ def run_arm_search(
         RobotError: pictures were asked for that these recordings do not have.
         JointscopeError: the recordings cannot be used, or a file cannot be written; then none is.
     """
-    from jointscope.graphs.joint_kinds.discover_arm import (
-        calibrated,
-        diagnosed,
-        discover_arm,
-        scored,
-    )
+    from jointscope.graphs.joint_kinds.discover_arm import diagnosed, discover_arm, scored
+    from jointscope.graphs.joint_kinds.likeliest_effect import calibrated
     from jointscope.tools.bags.at_poses.read_poses import read_poses
     from jointscope.tools.terminal.searches.arm_discovery_text import (
         arm_discovery_text,
