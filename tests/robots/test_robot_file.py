@@ -53,13 +53,13 @@ MISTAKES = [
     ("topic: /motor_command", "topic: /motor_command\n  names: [a, b]",
      "my.yaml: command.names: expected 3 names, one per joint, got 2"),
     ("unit: rad\n", "unit: grad\n", "my.yaml: sensors.motor_encoder.unit: "
-     "expected one of rad, deg, turn, m, mm, rad/s, deg/s, rpm, duty, V, A, N m, m/s^2, g, got 'grad'"),
+     "expected one of rad, deg, turn, m, mm, rad/s, deg/s, rpm, duty, V, A, mA, N m, m/s^2, g, got 'grad'"),
     ("unit: rad\n", "unit: V\n", "my.yaml: sensors.motor_encoder.unit: "
      "an encoder measures an angle or a length, got 'V'"),
     ("unit: rad/s\n", "unit: rad\n", "my.yaml: sensors.imu1.unit: a gyroscope measures an angular rate, got 'rad'"),
     ("kind: motor_encoder", "kind: encoder",
-     "my.yaml: sensors.motor_encoder.kind: expected one of motor_encoder, link_encoder, joint_torque, gyro, "
-     "accelerometer, position_target, got 'encoder'"),
+     "my.yaml: sensors.motor_encoder.kind: expected one of motor_encoder, link_encoder, joint_torque, "
+     "motor_current, gyro, accelerometer, position_target, got 'encoder'"),
     ("sigma: 6.9259e-5", "sigma: 0", "my.yaml: sensors.motor_encoder.sigma: expected a number above zero, got 0"),
     ("sigma: 6.9259e-5", "sigma: .nan", "my.yaml: sensors.motor_encoder.sigma: expected a finite number, got nan"),
     ("body: link1", "body: link9", "my.yaml: sensors.imu1.body: no link 'link9'; did you mean 'link3'?"),

@@ -45,7 +45,7 @@ CATALOGUE = {  # id: (owners, parameters) as simulator and estimator have agreed
     "link_coulomb": ("joint", "torque"),
     "gravity_imbalance": ("joint", "cos sin"),
     "parallel_spring": ("joint", "stiffness torque"),
-    "payload": ("last joint", "inertia"),
+    "payload": ("last joint, robot with a target", "inertia"),
     "inertia_error": ("joint", "ixx iyy izz"),
     "bearing_flexibility": (
         "joint",
