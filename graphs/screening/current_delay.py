@@ -147,7 +147,8 @@ def current_gap(robot: Robot, recordings: Sequence[Recording]) -> CurrentGap | N
 
 def tried_delays(step: float) -> Array:
     """Delays that are looked at, a few in each step of the commands; shape (k,) [s]."""
-    return step / PER_STEP * np.arange(round(EARLIEST / step * PER_STEP), round(LATEST / step * PER_STEP) + 1)
+    first, last = (round(end / step * PER_STEP) for end in (EARLIEST, LATEST))
+    return np.asarray(step / PER_STEP * np.arange(first, last + 1), dtype=np.float64)
 
 
 def with_current_constants(start: Calibration, robot: Robot, recordings: Sequence[Recording]) -> Calibration:
