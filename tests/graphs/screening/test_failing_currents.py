@@ -68,3 +68,14 @@ def test_recordings_with_another_delay_each_are_refused_also_where_their_gaps_to
 def test_irregular_stamps_of_one_delay_are_no_contradiction(robot):
     both = [simulated(robot, 0.002, jitter=jitter).recording for jitter in (2e-4, 1e-4)]
     assert with_current_delay(robot, both)[0].motor_current.delay == pytest.approx(0.002, abs=5e-5)
+
+
+@pytest.mark.parametrize("steps", [3.0, 15.0])
+def test_smoothed_currents_are_named_with_how_long(robot, recording, steps):
+    i = recording.streams["current"].values.copy()
+    for k in range(1, len(i)):  # a drive that filters, at 1 kHz
+        i[k] = i[k - 1] + (1.0 - np.exp(-1.0 / steps)) * (i[k] - i[k - 1])
+    said = mistaken_currents(changed(recording, i), robot)
+    found = [float(notice.text.split("about ")[1].split()[0]) for notice in said if "smoothed, over" in notice.text]
+    assert len(found) == 1 and 0.6 * steps < found[0] < 1.5 * steps, said
+    assert mistaken_currents(recording, robot) == []
