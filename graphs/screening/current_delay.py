@@ -18,8 +18,10 @@ from numpy.typing import NDArray
 from jointscope.factors.calibration import DYNAMICS, Calibration
 from jointscope.graphs.screening.drive_currents import EARLIEST, LATEST, DriveCurrents
 from jointscope.robots.effect_kinds.command_effect import CommandEffect
+from jointscope.robots.errors import RecordingError
 from jointscope.robots.model.command_words import robot_argument
 from jointscope.robots.model.robot import Robot
+from jointscope.robots.parts.motor_current import MotorCurrent
 from jointscope.robots.recordings.recording import Notice, Recording
 
 Array = NDArray[np.float64]
@@ -29,6 +31,7 @@ SURE = 25.0  # chi-square by which another delay must be better
 PER_STEP = 4  # delays that are tried in a step
 HALVINGS = 12  # to the ends of a gap
 MOVED = 0.01  # of the samples that see another command beyond them
+APART = 0.75  # steps between the middles of the gaps of two recordings, beyond which they share no delay
 LATE_COMMAND = 1.5  # steps by which a command must be later than the speeds
 
 
@@ -46,9 +49,19 @@ class CurrentGap:
     command: float = 0.0
 
     @property
+    def middle(self) -> float:
+        """Between both ends."""
+        return (self.first + self.last) / 2.0
+
+    def __str__(self) -> str:
+        """As "1 to 2 ms"."""
+        first, last = (round(1e3 * end, 2) + 0.0 for end in (self.first, self.last))  # + 0.0: no "-0"
+        return f"{first:g} to {last:g} ms"
+
+    @property
     def start(self) -> float:
         """No delay where that is among them, else the middle."""
-        return 0.0 if self.first <= 0.0 < self.last else (self.first + self.last) / 2.0
+        return 0.0 if self.first <= 0.0 < self.last else self.middle
 
     @property
     def sigma(self) -> float:
@@ -62,10 +75,14 @@ def with_current_delay(robot: Robot, recordings: Sequence[Recording]) -> tuple[R
     Args:
         robot: the model.
         recordings: of it.
+
+    Raises:
+        RecordingError: one delay cannot be that of all recordings.
     """
     sensor = robot.motor_current
     if sensor is None or not sensor.estimate_delay or not recordings:
         return robot, []
+    _check_same(robot, sensor, recordings)
     gap = current_gap(robot, recordings)
     if gap is None:
         return robot, []
@@ -74,8 +91,8 @@ def with_current_delay(robot: Robot, recordings: Sequence[Recording]) -> tuple[R
         late = sensor.delay
     elif late != sensor.delay:
         text = (
-            f"{sensor.name}: currents fit their drives with a delay of {1e3 * gap.first:.3g} to {1e3 * gap.last:.3g} "
-            f"ms, the file says {1e3 * sensor.delay:.3g} ms; `estimate_delay: false` in sensors.{sensor.name} keeps it"
+            f"{sensor.name}: currents fit their drives with a delay of {gap}, "
+            f"the file says {1e3 * sensor.delay:.3g} ms; `estimate_delay: false` in sensors.{sensor.name} keeps it"
         )
         said.append(Notice(sensor.name, "info", 0, text))
     if gap.command:
@@ -88,13 +105,30 @@ def with_current_delay(robot: Robot, recordings: Sequence[Recording]) -> tuple[R
     return robot.with_sensors({sensor.name: replace(sensor, delay=late, delay_sigma=gap.sigma)}), said
 
 
+def _check_same(robot: Robot, sensor: MotorCurrent, recordings: Sequence[Recording]) -> None:
+    """Recordings share one delay: gaps between other commands do not have one."""
+    if len(recordings) < 2:
+        return
+    gaps = [(gap, r) for r in recordings if (gap := current_gap(robot, [r])) is not None]
+    if not gaps:
+        return
+    early, late = (which(gaps, key=lambda each: each[0].middle) for which in (min, max))
+    step = float(np.median(np.diff(late[1].command.times)))
+    if late[0].middle - early[0].middle > APART * step:
+        said = " and ".join(f"{g} in {r.path}" for g, r in (early, late))
+        raise RecordingError(
+            f"{sensor.name}: currents are late by {said}, and one delay has to serve all of them; calibrate them one "
+            f"by one, or write `estimate_delay: false` in sensors.{sensor.name}, which keeps that of the file"
+        )
+
+
 def current_gap(robot: Robot, recordings: Sequence[Recording]) -> CurrentGap | None:
     """Between which stamps of commands the currents of a robot were read; None where recordings do not tell."""
     parts = [part for recording in recordings if (part := DriveCurrents.of(recording, robot)) is not None]
     if not parts:
         return None
     h = float(np.median([part.h for part in parts]))
-    tried = h / PER_STEP * np.arange(round(EARLIEST / h * PER_STEP), round(LATEST / h * PER_STEP) + 1)
+    tried = tried_delays(h)
     costs = _Costs(parts)
     lefts = np.array([costs.left(late, late) for late in tried])
     if costs.share(best := float(tried[_lowest(lefts)])) > FITS or _lowest(lefts) in (0, len(tried) - 1):
@@ -109,6 +143,12 @@ def current_gap(robot: Robot, recordings: Sequence[Recording]) -> CurrentGap | N
             seen, command = speeds, 0.0 if free else best - speeds
     gap = CurrentGap(*costs.gap(seen, h), command)
     return gap if len(parts[0].times) * np.sum(np.log(costs.worst(gap, h) / costs.left(best, best))) > SURE else None
+
+
+def tried_delays(step: float) -> Array:
+    """Delays that are looked at, a few in each step of the commands; shape (k,) [s]."""
+    first, last = (round(end / step * PER_STEP) for end in (EARLIEST, LATEST))
+    return np.asarray(step / PER_STEP * np.arange(first, last + 1), dtype=np.float64)
 
 
 def with_current_constants(start: Calibration, robot: Robot, recordings: Sequence[Recording]) -> Calibration:

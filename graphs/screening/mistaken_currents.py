@@ -3,10 +3,13 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 from numpy.typing import NDArray
+from scipy.signal import lfilter
 
-from jointscope.graphs.screening.current_delay import FITS, current_gap
+from jointscope.graphs.screening.current_delay import FITS, current_gap, tried_delays
 from jointscope.graphs.screening.drive_currents import DriveCurrents
 from jointscope.graphs.screening.exchanged_joints import names_or_places
 from jointscope.robots.model.command_words import robot_argument
@@ -18,6 +21,10 @@ Array = NDArray[np.float64]
 
 MISTAKEN_CURRENT = "current"  # kind of its notices
 CLEARLY = 3.0  # times less that another drive must leave
+LITTLE = 0.7  # of a channel's standard deviation: where a drive leaves more it explains next to nothing
+NOISE = 3.0  # times its noise that must be left, too
+SMOOTHINGS = (2.0, 3.0, 5.0, 8.0, 12.0, 20.0, 32.0)  # steps of the commands, time constants that are tried
+AGES = 8  # steps of delay that are tried with them
 THOUSAND, NEAR = 1000.0, 2.4  # between A and mA, and how far a ratio may be from it
 
 
@@ -37,12 +44,57 @@ def mistaken_currents(recording: Recording, robot: Robot) -> list[Notice]:
     gap = current_gap(robot, [recording])
     late = sensor.delay if gap is None or np.any(exchanged != own) else gap.start
     fits = [drives.fit(j, k, late, late) for j, k in enumerate(np.argsort(exchanged).tolist())]
-    said = [_exchanged(robot, sensor, exchanged)] if np.any(exchanged != own) else []
+    said = [] if gap is not None or np.any(exchanged != own) else _unexplained(robot, sensor, drives)
+    said += [] if said or np.any(exchanged != own) else _smoothed(robot, sensor, drives)
+    said += [_exchanged(robot, sensor, exchanged)] if np.any(exchanged != own) else []
     if all(fit.share < FITS for fit in fits):
         factors = np.array([_factor(robot, sensor, j, fit.by_command) for j, fit in enumerate(fits)])
         if np.any(factors != 1.0):
             said.append(_scaled(robot, sensor, factors))
     return [Notice(sensor.name, MISTAKEN_CURRENT, 0, text) for text in said]
+
+
+def _unexplained(robot: Robot, sensor: MotorCurrent, drives: DriveCurrents) -> list[str]:
+    """Currents of which their drives explain next to nothing at any delay, while they are far more than noise."""
+    tried, size = tried_delays(drives.h), np.std(drives.currents, axis=0)
+    left = np.min([[drives.fit(j, j, late, late).share for j in range(drives.n)] for late in tried], axis=0)
+    wrong = [j for j in range(robot.n) if left[j] > LITTLE and left[j] * size[j] > NOISE * sensor.sigmas[j]]
+    if not wrong:
+        return []
+    joints, parts = (", ".join(each[j] for j in wrong) for each in (robot.joints, [f"{100.0 * x:.0f} %" for x in left]))
+    return [
+        f"{sensor.name}: commands and speeds of {joints} leave {parts} of their currents: these are of another joint, "
+        f"stop, or are clipped or smoothed; look at {sensor.source.topic}, or remove sensors.{sensor.name} from "
+        f"{robot_argument(robot)}"
+    ]
+
+
+def _smoothed(robot: Robot, sensor: MotorCurrent, drives: DriveCurrents) -> list[str]:
+    """Currents that are clearly those of commands and speeds behind a low-pass, all of them."""
+
+    def left(of: DriveCurrents) -> Array:
+        tried = of.h * (np.arange(-1, AGES) + 0.5)
+        return np.min([[of.fit(j, j, late, late).share for j in range(of.n)] for late in tried], axis=0)
+
+    plain = left(drives)
+    if np.any(plain * np.std(drives.currents, axis=0) < NOISE * sensor.sigmas):
+        return []
+    shares = np.array([left(_behind_low_pass(drives, steps)) for steps in SMOOTHINGS])
+    best = int(np.argmin(np.sum(np.log(np.maximum(shares, 1e-12)), axis=1)))
+    if np.any(shares[best] > plain / CLEARLY):
+        return []
+    return [
+        f"{sensor.name}: the currents seem to be smoothed, over about {1e3 * SMOOTHINGS[best] * drives.h:.2g} ms: so "
+        "commands and speeds explain them, and the model has no filter for currents; switch the drive's filter off, or "
+        f"remove sensors.{sensor.name} from {robot_argument(robot)}"
+    ]
+
+
+def _behind_low_pass(drives: DriveCurrents, steps: float) -> DriveCurrents:
+    """The same signals behind a first-order low-pass with so many steps as time constant."""
+    keep = float(np.exp(-1.0 / steps))
+    u, v = (lfilter([1.0 - keep], [1.0, -keep], signal, axis=0) for signal in (drives.u, drives.v))
+    return replace(drives, u=np.asarray(u), v=np.asarray(v))
 
 
 def _shares(drives: DriveCurrents, late: float) -> Array:

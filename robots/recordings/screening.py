@@ -32,6 +32,7 @@ Array = NDArray[np.float64]
 
 MIN_SECONDS = 0.3  # [s]
 FROZEN_SAMPLES, FROZEN_SECONDS = 20, 0.1  # [1], [s] a gyro does not repeat itself that often by chance
+FOLLOWED = 0.05  # of its range, by which a command moves what follows it
 MIN_SAMPLES = 100  # of each sensor
 BEYOND_LIMIT = 1.2  # times the robot's limit: odd
 IMPOSSIBLE = 5.0  # times the robot's limit: wrong units
@@ -72,6 +73,8 @@ def screen(recording: Recording, robot: Robot) -> list[Notice]:
         _check_changes(recording, recording.streams[name], robot)
     for biased in robot.biased:
         _check_frozen(recording.streams[biased.name])
+    if robot.motor_current is not None:
+        _check_frozen(recording.streams[robot.motor_current.name], recording.command)
     notices += _check_limits(motion, robot)
     notices += _check_motion(recording, robot)
     notices += check_targets(recording, robot, motion)
@@ -95,11 +98,20 @@ def _check_samples(stream: Stream) -> None:
         raise RecordingError(f"{stream.name} is too short: {len(stream)} samples; expected at least {MIN_SAMPLES}")
 
 
-def _check_frozen(stream: Stream) -> None:
-    """A gyro or accelerometer whose noise stops repeats its last sample: the sensor or its driver has died."""
+def _check_frozen(stream: Stream, command: Stream | None = None) -> None:
+    """A sensor whose noise stops repeats its last sample: it or its driver has died.
+
+    Args:
+        stream: of the sensor.
+        command: of what it follows, where it may well repeat itself as long as that stands; None where its noise never
+            rests.
+    """
     same = np.all(stream.values[1:] == stream.values[:-1], axis=1)
     edges = np.flatnonzero(np.diff(np.concatenate([[False], same, [False]]).astype(int)))
     starts, stops = edges[::2], edges[1::2]
+    if command is not None:
+        kept = [_moves(command, *stream.times[[start, stop]]) for start, stop in zip(starts, stops, strict=True)]
+        starts, stops = starts[kept], stops[kept]
     if len(starts) == 0:
         return
     lengths = stops - starts
@@ -109,7 +121,14 @@ def _check_frozen(stream: Stream) -> None:
         raise RecordingError(
             f"{stream.name} repeats one sample from {t0:.3f} to {t1:.3f} s: the sensor has stopped; use the part of "
             "the recording before or after it"
+            + ("" if command is None else f", or remove {stream.name} from the robot file")
         )
+
+
+def _moves(command: Stream, t0: float, t1: float) -> bool:
+    """Whether commands change clearly between two times [s]."""
+    inside = command.values[(command.times >= t0) & (command.times <= t1)]
+    return len(inside) > 0 and bool(np.any(np.ptp(inside, axis=0) > FOLLOWED * np.ptp(command.values, axis=0)))
 
 
 def _check_wraps(stream: Stream, units: Sequence[str]) -> None:

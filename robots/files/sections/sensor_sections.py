@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -53,6 +53,8 @@ def topic(section: Section, joints: tuple[str, ...] = (), units: tuple[str, ...]
     if joints and len(names) != len(joints):
         raise RobotError(f"{section.place}.names: expected {len(joints)} names, one per joint, got {len(names)}")
     scale = tuple(section.array("scale", (len(joints),), np.ones(len(joints))).tolist()) if scaled else ()
+    if 0.0 in scale:
+        raise RobotError(f"{section.place}.scale: expected numbers other than zero, got {list(scale)}")
     wraps = section.number("wraps", None, positive=True) if scaled else None
     place = section.text("topic"), section.text("type"), section.text("field")
     return Topic(*place, unit, names, scale, wraps or 0.0, each, _stamped_by(section, joints))
@@ -160,6 +162,11 @@ def _motor_current(name: str, section: Section, joints: tuple[str, ...]) -> Moto
             f"{section.place}.unit: a current is in A or mA, got {wrong!r}; of a torque that the drive works out from "
             "its current, write A: what one unit makes is a parameter of its own"
         )
+    if source.wraps:
+        raise RobotError(f"{section.place}.wraps: a current does not begin anew like a counter; remove it")
+    given = section.raw("delay")
+    if given is not None and not isinstance(given, Mapping):
+        raise RobotError(f"{section.place}.delay: expected a value in seconds, as {{value: 0.003}}, got {given!r}")
     delay = section.section("delay", {"value": 0.0})
     found = MotorCurrent(
         name=name,

@@ -306,7 +306,10 @@ def test_a_file_with_currents_is_read_and_written(tmp_path, result):
     [
         (SENSOR.replace("mA", "N m"), None, "a current is in A or mA, got 'N m'"),
         (SENSOR.replace("0.003", "3.0"), None, "expected seconds, at most 0.1, got 3"),
+        (SENSOR.replace("{value: 0.003}", "3.2 ms"), None, r"delay: expected a value in seconds, .* got '3.2 ms'"),
         (SENSOR.replace("0.02,", "-0.02,"), None, "expected numbers above zero"),
+        (SENSOR + "    scale: [1, 0, 1]\n", None, r"scale: expected numbers other than zero, got \[1.0, 0.0, 1.0\]"),
+        (SENSOR + "    wraps: 6.28\n", None, "wraps: a current does not begin anew like a counter"),
         (SENSOR, [], "'current.torque_per_ampere_joint1' is missing, the torque of one ampere behind the gear"),
     ],
 )

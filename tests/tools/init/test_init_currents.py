@@ -65,3 +65,18 @@ def test_where_a_command_is_no_voltage_the_efforts_are_left_out_with_a_reason(ba
     text = init(bag, tmp_path / "robot.yaml", "--unit", "A")
     assert "kind: motor_current" not in text
     assert "not used: /joint_states, effort: what the motors report" in text
+
+
+def test_efforts_of_other_joints_are_left_out_and_not_for_want_of_volts(bag, tmp_path):
+    doggy = load_robot("doggy")
+    effort = replace(doggy.motor_encoder.source, field="effort", unit="A")
+    sensor = MotorCurrent("motor_current", effort, np.full(3, 0.02), doggy.joints)
+    own = {name: Parameter(name, value, "N m/A", value, 1.0) for name, value in CONSTANTS.items()}
+    robot = replace(doggy, sensors={**doggy.sensors, sensor.name: sensor}, parameters={**doggy.parameters, **own})
+    recording = read_recording(bag, robot)
+    stream = recording.streams[sensor.name]
+    turned = replace(stream, values=stream.values[:, [1, 2, 0]])
+    write_bag(tmp_path / "bag", replace(recording, streams={**recording.streams, sensor.name: turned}), robot)
+    text = init(tmp_path / "bag", tmp_path / "robot.yaml", "--unit", "duty")
+    assert "kind: motor_current" not in text
+    assert "commands and speeds do not explain it as currents of the same joints, in the same order" in text
