@@ -167,7 +167,7 @@ def _moving(
     if near is None:
         base = starting_model(robot, given.motion, solver)
     else:
-        base = BaseModel.of(robot, given.motion, near, solver=solver)
+        base = BaseModel.of(robot, given.motion, near, follow=True, solver=solver)
     later = {"base": base, "progress": lambda text, share: report(text, 0.3 + 0.7 * share)}
     holdout = held.motion[0] if held.motion else None
     return diagnose(base.robot, given.motion, holdout, **{**options, **later}), base

@@ -78,7 +78,7 @@ def calibrate_shared(
     calibration = partial(calibrate, sets=still_sets)
     if given.shaken:
         calibration = partial(calibrate_beside_motion, shaken=given.shaken, sets=still_sets)
-    motion = BaseModel.of(robot, given.motion, near, solver=solver, calibration=calibration)
+    motion = BaseModel.of(robot, given.motion, near, follow=True, solver=solver, calibration=calibration)
     result = with_rests(motion.result)
     motion = replace(motion, robot=result.robot, result=result)
     return SharedModel(result.robot, motion, None, poses, tuple(at_rest))

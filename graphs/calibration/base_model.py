@@ -72,6 +72,7 @@ class BaseModel:
         start: BaseModel | None = None,
         *,
         by_torques: bool | None = None,
+        follow: bool = False,
         solver: Solver = solve,
         calibration: Callable[..., CalibrationResult] = calibrate,
     ) -> BaseModel:
@@ -80,7 +81,9 @@ class BaseModel:
         Args:
             robot: the model with start values.
             recordings: training recordings.
-            start: a model of the same recordings whose values and states are near; nothing is guessed anew.
+            start: a model of the same recordings whose values are near; nothing is guessed anew.
+            follow: whether its states are taken over, too, where both have the same springs and bearings. Those of a
+                model without a spring hold its motor where the joint is, and no step leads from there.
             by_torques: see there; as the start where there is one, else wherever the robot allows it.
             solver: minimises the cost of all samples.
             calibration: `calibrate`, or what calibrates with recordings of other kinds in the same graph.
@@ -91,7 +94,8 @@ class BaseModel:
         full = with_full_gyros(robot).without([s for s in (robot.torque_sensor, robot.motor_current) if s is not None])
         full = without_lasting(full)  # what is missing must not hide in torques that last
         full = holding_sharpness(full, recordings)  # nor in a friction that is rounded off
-        near = None if start is None else NearSolution(start.calibrations, start.states_for(full))
+        states = start.states_for(full) if start is not None and follow else ()
+        near = None if start is None else NearSolution(start.calibrations, states)
         # motors behind which links swing that nobody sees tell of these while they move
         moving = by_torques or (seen_by_one_encoder(full) and len(full.noise.unseen) > 0)
         result = calibration(full, recordings, near=near, standstill=not moving, memory=False, solver=solver)
@@ -126,7 +130,9 @@ class BaseModel:
         return layout.carried_over(x, self.layout)
 
     def states_for(self, robot: Robot) -> tuple[Array, ...]:
-        """Smoothed states of each recording in the layout of another robot, shape (m + 1, d)."""
+        """Smoothed states of each recording in the layout of another robot, shape (m + 1, d); none of other bodies."""
+        if (robot.layout.links, robot.layout.motors) != (self.layout.links, self.layout.motors):
+            return ()
         same = [robot.layout.carried_over(x, self.layout) for x in self.states]
         return tuple(unlagged(robot, x, known=self.layout.memories) for x in same)
 
