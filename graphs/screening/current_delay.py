@@ -131,7 +131,9 @@ def current_gap(robot: Robot, recordings: Sequence[Recording]) -> CurrentGap | N
     tried = tried_delays(h)
     costs = _Costs(parts)
     lefts = np.array([costs.left(late, late) for late in tried])
-    if costs.share(best := float(tried[_lowest(lefts)])) > FITS or _lowest(lefts) in (0, len(tried) - 1):
+    at = _lowest(lefts)
+    best = float(tried[at])
+    if costs.share(best) > FITS or at in (0, len(tried) - 1):
         return None
     seen, command = best, 0.0
     if parts[0].by_volts:

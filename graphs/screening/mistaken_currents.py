@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 from scipy.signal import lfilter
 
 from jointscope.graphs.screening.current_delay import FITS, current_gap, tried_delays
+from jointscope.graphs.screening.drive_channels import CLEARLY, DriveChannels, belongs_to, thousands
 from jointscope.graphs.screening.drive_currents import DriveCurrents
-from jointscope.graphs.screening.exchanged_joints import names_or_places
 from jointscope.robots.model.command_words import robot_argument
 from jointscope.robots.model.robot import Robot
 from jointscope.robots.parts.motor_current import MotorCurrent
@@ -20,12 +20,14 @@ from jointscope.robots.recordings.recording import Notice, Recording
 Array = NDArray[np.float64]
 
 MISTAKEN_CURRENT = "current"  # kind of its notices
-CLEARLY = 3.0  # times less that another drive must leave
 LITTLE = 0.7  # of a channel's standard deviation: where a drive leaves more it explains next to nothing
 NOISE = 3.0  # times its noise that must be left, too
 SMOOTHINGS = (2.0, 3.0, 5.0, 8.0, 12.0, 20.0, 32.0)  # steps of the commands, time constants that are tried
 AGES = 8  # steps of delay that are tried with them
-THOUSAND, NEAR = 1000.0, 2.4  # between A and mA, and how far a ratio may be from it
+LOOKS = (
+    "is a thousand times what its command makes, as in another unit of A and mA",
+    "is a thousandth of what its command makes, as in another unit of A and mA",
+)
 
 
 def mistaken_currents(recording: Recording, robot: Robot) -> list[Notice]:
@@ -39,18 +41,19 @@ def mistaken_currents(recording: Recording, robot: Robot) -> list[Notice]:
     drives = None if sensor is None else DriveCurrents.of(recording, robot)
     if sensor is None or drives is None:
         return []
-    own = np.arange(robot.n)
-    exchanged = _belongs_to(_shares(drives, sensor.delay))
-    gap = current_gap(robot, [recording])
-    late = sensor.delay if gap is None or np.any(exchanged != own) else gap.start
-    fits = [drives.fit(j, k, late, late) for j, k in enumerate(np.argsort(exchanged).tolist())]
-    said = [] if gap is not None or np.any(exchanged != own) else _unexplained(robot, sensor, drives)
-    said += [] if said or np.any(exchanged != own) else _smoothed(robot, sensor, drives)
-    said += [_exchanged(robot, sensor, exchanged)] if np.any(exchanged != own) else []
+    own, channels = belongs_to(_shares(drives, sensor.delay)), DriveChannels(robot, sensor, "current")
+    if np.any(own != np.arange(robot.n)):
+        said, late = [channels.exchanged(own)], sensor.delay
+    else:
+        gap = current_gap(robot, [recording])
+        said = _unexplained(robot, sensor, drives) if gap is None else []
+        said = said or _smoothed(robot, sensor, drives)
+        late = sensor.delay if gap is None else gap.start
+    fits = [drives.fit(j, k, late, late) for j, k in enumerate(np.argsort(own).tolist())]
     if all(fit.share < FITS for fit in fits):
         factors = np.array([_factor(robot, sensor, j, fit.by_command) for j, fit in enumerate(fits)])
         if np.any(factors != 1.0):
-            said.append(_scaled(robot, sensor, factors))
+            said.append(channels.scaled(factors, LOOKS))
     return [Notice(sensor.name, MISTAKEN_CURRENT, 0, text) for text in said]
 
 
@@ -102,14 +105,6 @@ def _shares(drives: DriveCurrents, late: float) -> Array:
     return np.array([[drives.fit(j, k, late, late).share for j in range(drives.n)] for k in range(drives.n)])
 
 
-def _belongs_to(left: Array) -> NDArray[np.intp]:
-    """Joint of each channel: another one than its own where it fits clearly better, all of them together."""
-    own = np.arange(len(left))
-    best = np.argmin(left, axis=1)
-    better = left[own, best] < left[own, own] / CLEARLY
-    return best if sorted(best) == list(own) and bool(np.all(better[best != own])) else own
-
-
 def _factor(robot: Robot, sensor: MotorCurrent, j: int, by_command: float) -> float:
     """What the values of a joint are to be multiplied by: a sign, and a thousand where the unit is another one."""
     joint = robot.joints[j]
@@ -117,31 +112,4 @@ def _factor(robot: Robot, sensor: MotorCurrent, j: int, by_command: float) -> fl
     constant = robot.parameters.get(sensor.torque_per_ampere(joint))
     expected = robot.command_volts * (gain / constant.prior if constant is not None else 1.0)
     sign = -1.0 if by_command * expected < 0.0 else 1.0
-    for factor in (THOUSAND, 1.0 / THOUSAND):
-        if 1.0 / NEAR < abs(by_command / expected) * factor < NEAR:
-            return sign * factor
-    return sign
-
-
-def _exchanged(robot: Robot, sensor: MotorCurrent, own: NDArray[np.intp]) -> str:
-    names = names_or_places(sensor.source, robot.n)
-    right = [names[channel] for channel in np.argsort(own)]
-    wrong = [joint for k, joint in enumerate(robot.joints) if own[k] != k]
-    return (
-        f"{sensor.name}: currents of {' and '.join(wrong)} seem to be exchanged: so the drives explain them; if so, "
-        f"write `names: [{', '.join(right)}]` in sensors.{sensor.name} of {robot_argument(robot)}"
-    )
-
-
-def _scaled(robot: Robot, sensor: MotorCurrent, factors: Array) -> str:
-    wrong = ", ".join(joint for joint, factor in zip(robot.joints, factors, strict=True) if factor != 1.0)
-    reasons = ["counts the other way than its drive"] if np.any(factors < 0.0) else []
-    sizes = np.abs(factors)
-    if np.any(sizes != 1.0):
-        by = "a thousand times" if float(sizes[sizes != 1.0][0]) < 1.0 else "a thousandth of"
-        reasons.append(f"is {by} what its command makes, as in another unit of A and mA")
-    scale = ", ".join(f"{factor:.12g}" for factor in factors * np.asarray(sensor.source.scale or 1.0))
-    return (
-        f"{sensor.name}: current of {wrong} {' and '.join(reasons)}; if that is so, write `scale: [{scale}]` in "
-        f"sensors.{sensor.name} of {robot_argument(robot)}"
-    )
+    return sign * thousands(abs(by_command / expected))

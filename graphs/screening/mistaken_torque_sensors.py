@@ -16,7 +16,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from jointscope.graphs.screening.exchanged_joints import names_or_places
+from jointscope.graphs.screening.drive_channels import CLEARLY, DriveChannels, belongs_to, thousands
 from jointscope.graphs.screening.windowed_motion import faded_mean, windowed_motion
 from jointscope.robots.model.command_words import robot_argument
 from jointscope.robots.model.robot import Robot
@@ -28,14 +28,13 @@ Array = NDArray[np.float64]
 MISTAKEN_TORQUE = "torque"  # kind of its notices
 WINDOW, PERIODS = 0.01, 3.0  # [s], [periods] of the slowest stream: a window is as long as the longer one
 LINK_WINDOW = 0.1  # [s] long against what springs swing
+LOOKS = ("looks like N mm beside what its links need", "looks like kN m beside what its links need")
 INSTANTS, FEWEST = 1500, 100
 FITS = 0.3  # of a channel that its drive may leave
-CLEARLY = 3.0  # times less that another drive, or another time, must leave
 BOTH = 1.5  # times what a late sensor leaves: a late command that leaves no more explains it, too
 REVERSAL = 0.02  # [rad/s] within which dry friction turns over
 LAGS = np.arange(-30, 31) * 1e-3  # [s]
 SHORTEST_LAG = 0.003  # [s]
-THOUSAND, NEAR = 1000.0, 2.4  # the factor between N m and N mm or kN m, and how far a ratio may be from it
 
 
 def mistaken_torque_sensors(recording: Recording, robot: Robot) -> list[Notice]:
@@ -55,13 +54,13 @@ def mistaken_torque_sensors(recording: Recording, robot: Robot) -> list[Notice]:
         return []
     now = drives.at()
     left = np.array([[now.left(i, k) for i in range(robot.n)] for k in range(robot.n)])
-    own = _belongs_to(left)
-    said = [_exchanged(robot, sensor, own)] if np.any(own != np.arange(robot.n)) else []
+    own, channels_of = belongs_to(left, FITS), DriveChannels(robot, sensor, "torque")
+    said = [channels_of.exchanged(own)] if np.any(own != np.arange(robot.n)) else []
     if all(left[k, joint] < FITS for k, joint in enumerate(own)):
         channels = np.argsort(own)  # of each joint
         scale = now.signs(channels) / _size(recording, robot, channels)
         if np.any(scale != 1.0):
-            said.append(_scaled(robot, sensor, scale))
+            said.append(channels_of.scaled(scale, LOOKS))
         lag = drives.lag(channels)
         if lag:
             said.append(_out_of_time(robot, sensor, lag))
@@ -166,15 +165,6 @@ def _left(y: Array, A: Array, found: Array) -> float:
     return float(np.std(y - A @ found)) / size if size > 0.0 else np.inf
 
 
-def _belongs_to(left: Array) -> NDArray[np.intp]:
-    """Joint of each channel: another one than its own where it fits clearly better, all of them together."""
-    own = np.arange(len(left))
-    best = np.argmin(left, axis=1)
-    moved = best != own
-    better = left[own, best] < np.minimum(left[own, own] / CLEARLY, FITS)
-    return best if sorted(best) == list(own) and bool(np.all(better[moved])) else own
-
-
 def _size(recording: Recording, robot: Robot, channels: NDArray[np.intp]) -> Array:
     """By which power of a thousand the channel of each joint is larger than the torque that rigid links need."""
     assert robot.torque_sensor is not None
@@ -189,36 +179,8 @@ def _size(recording: Recording, robot: Robot, channels: NDArray[np.intp]) -> Arr
     needed = robot.tree.torque(q - robot.motor_encoder.zero, v, a)
     seen = np.std(faded_mean(torque, times, LINK_WINDOW)[:, channels], axis=0)
     for joint, ratio in enumerate(seen / np.maximum(np.std(needed, axis=0), 1e-300)):
-        for factor in (THOUSAND, 1.0 / THOUSAND):
-            if 1.0 / NEAR < ratio / factor < NEAR:
-                sizes[joint] = factor
+        sizes[joint] = 1.0 / thousands(float(ratio))
     return sizes
-
-
-def _exchanged(robot: Robot, sensor: TorqueSensor, own: NDArray[np.intp]) -> str:
-    names = names_or_places(sensor.source, robot.n)
-    right = [names[channel] for channel in np.argsort(own)]
-    wrong = [joint for k, joint in enumerate(robot.joints) if own[k] != k]
-    return (
-        f"{sensor.name}: torques of {' and '.join(wrong)} seem to be exchanged: so the drives explain them; if that is "
-        f"so, write `names: [{', '.join(right)}]` in sensors.{sensor.name} of {robot_argument(robot)}"
-    )
-
-
-def _scaled(robot: Robot, sensor: TorqueSensor, factors: Array) -> str:
-    wrong = ", ".join(joint for joint, factor in zip(robot.joints, factors, strict=True) if factor != 1.0)
-    reasons = []
-    if np.any(factors < 0.0):
-        reasons.append("counts the other way than its drive")
-    sizes = np.abs(factors)
-    if np.any(sizes != 1.0):
-        unit = {1.0 / THOUSAND: "N mm", THOUSAND: "kN m"}[float(sizes[sizes != 1.0][0])]
-        reasons.append(f"looks like {unit} beside what its links need")
-    scale = ", ".join(f"{factor:.12g}" for factor in factors * np.asarray(sensor.source.scale or 1.0))
-    return (
-        f"{sensor.name}: torque of {wrong} {' and '.join(reasons)}; if that is so, write `scale: [{scale}]` in "
-        f"sensors.{sensor.name} of {robot_argument(robot)}"
-    )
 
 
 def _out_of_time(robot: Robot, sensor: TorqueSensor, lag: float) -> str:
