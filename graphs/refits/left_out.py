@@ -87,11 +87,10 @@ class LeftOut:
 
         Values that have not come to rest may begin far off: they are given as many iterations again.
         """
-        if self.times(begun) < FAR:
-            return begun
-        if not begun.solution.converged:
-            begun = begun.further()
         times = self.times(begun)
+        if times >= FAR and not begun.solution.converged:
+            begun = begun.further()
+            times = self.times(begun)
         return begun if times < FAR else Missed(times, begun.solution.converged)
 
     def _cost_with(self, robot: Robot, values: Calibration) -> float | None:
