@@ -14,7 +14,7 @@ from jointscope.robots.effect_kinds.smoothed_reading import SmoothedReading
 from jointscope.robots.effect_kinds.time_shift import TimeShift
 from jointscope.robots.model.robot import Robot
 from jointscope.robots.parts.motor_current import MotorCurrent
-from jointscope.robots.parts.sensors import Accelerometer, MotorEncoder
+from jointscope.robots.parts.sensors import Accelerometer, MotorEncoder, Sensor
 
 Array = NDArray[np.float64]
 
@@ -61,9 +61,12 @@ class Lateness:
 
 def taken(robot: Robot, name: str, effects: tuple[EffectAt, ...], stamps: Array) -> Array:
     """When samples of a sensor were really taken, by effects and by its own delay, shape (m,) [s]."""
-    sensor = robot.sensors[name]
-    own = sensor.delay if isinstance(sensor, MotorCurrent) else 0.0
-    return stamps - Lateness.of(robot, effects, stamps).anchor - own
+    return stamps - Lateness.of(robot, effects, stamps).anchor - own_delay(robot.sensors[name])
+
+
+def own_delay(sensor: Sensor) -> float:
+    """Delay that a sensor has without any effect [s]."""
+    return sensor.delay if isinstance(sensor, MotorCurrent) else 0.0
 
 
 def late_channels(robot: Robot, name: str) -> list[tuple[NDArray[np.intp], tuple[EffectAt, ...]]]:

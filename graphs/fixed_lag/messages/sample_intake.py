@@ -15,7 +15,7 @@ from jointscope.graphs.fixed_lag.window.innovation import Innovation
 from jointscope.graphs.fixed_lag.window.observation import Observation
 from jointscope.robots.effect_kinds.effect_at import EffectAt
 from jointscope.robots.errors import EstimatorError
-from jointscope.robots.model.lateness import Lateness, late_channels
+from jointscope.robots.model.lateness import Lateness, late_channels, own_delay
 from jointscope.robots.model.robot import Robot
 from jointscope.robots.parts.motor_current import MotorCurrent
 from jointscope.robots.parts.position_target import PositionTarget
@@ -46,7 +46,7 @@ class SampleIntake:
         self._checks = {"command": SampleChecks([0.0] * robot.n, False)}
         self._sigmas = {name: s.sigmas for name, s in robot.sensors.items()}
         self._groups = {name: late_channels(robot, name) for name in robot.sensors}
-        self._delays = {name: s.delay if isinstance(s, MotorCurrent) else 0.0 for name, s in robot.sensors.items()}
+        self._delays = {name: own_delay(sensor) for name, sensor in robot.sensors.items()}
         for name, sensor in robot.sensors.items():
             self._checks[name] = SampleChecks(sensor.sigmas.tolist(), isinstance(sensor, NOISY))
 
