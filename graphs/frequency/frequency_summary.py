@@ -118,14 +118,7 @@ class FrequencySummary:
 
     def linearize(self, x: Array, calibration: Calibration) -> NormalEquations:
         """Normal equations of the shared values."""
-        system = NormalEquations.zeros(0, 1, calibration.size)
-        places = [calibration.names.index(name) for name in self.names]
-        away = calibration.dynamics[places] - self.preferred
-        columns = np.arange(calibration.size)[calibration.columns[DYNAMICS]][places]
-        system.C[np.ix_(columns, columns)] += self.information
-        system.g_p[columns] += self.information @ away
-        system.cost += 0.5 * float(away @ self.information @ away)
-        return system
+        return NormalEquations.gaussian(calibration, self.names, self.preferred, self.information)
 
 
 def _about_mean(bands: Array) -> Array:

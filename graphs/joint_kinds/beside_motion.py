@@ -65,7 +65,7 @@ def calibrate_beside_motion(
     for _ in range(MOST_PASSES):
         result = calibrate(robot, recordings, sets=[*sets, summary], progress=report, **options)
         there = summary_at(summary, result.robot).without_friction()
-        at, C, _ = _values(result, summary.names)
+        at, C, _ = coordinates_told(result, summary.names)
         if moved(at, C, summary, there) < AGREES:
             break
         summary = there
@@ -115,7 +115,7 @@ def responses_agree(result: CalibrationResult) -> Agreement | None:
     parameters = [result.robot.parameters[name] for name in summary.names]
     unit = np.array([p.coordinate_sigma for p in parameters])
     prior = np.array([np.log(p.prior) if p.positive else p.prior for p in parameters])
-    at, C, widened = _values(result, summary.names)
+    at, C, widened = coordinates_told(result, summary.names)
     eye, x = np.eye(len(unit)), (at - prior) / unit
     told = np.linalg.inv(C / np.outer(unit, unit)) - eye
     A = summary.information * np.outer(unit, unit)
@@ -130,7 +130,7 @@ def responses_agree(result: CalibrationResult) -> Agreement | None:
     return agreement((means[0], A_others), (means[1], A))
 
 
-def _values(result: CalibrationResult, names: Sequence[str]) -> tuple[Array, Array, Array]:
+def coordinates_told(result: CalibrationResult, names: Sequence[str]) -> tuple[Array, Array, Array]:
     """Coordinates of some values, their covariance before sigmas were widened, and the factors of that."""
     free: Callable[[str], int] = result.names.index
     index, by_name = [free(name) for name in names], {p.name: p for p in result.parameters}

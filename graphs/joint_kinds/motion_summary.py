@@ -18,11 +18,12 @@ from numpy.typing import NDArray
 
 from jointscope.factors.calibration import DYNAMICS, Calibration
 from jointscope.graphs.calibration.calibration_result import CalibrationResult
+from jointscope.graphs.joint_kinds.beside_motion import coordinates_told
 from jointscope.graphs.problem.bag_problem import BagProblem
 from jointscope.graphs.solving.banded_solver import Elimination, eliminations_of
+from jointscope.graphs.solving.batch_solver import reduced_system
 from jointscope.graphs.solving.estimate import Estimate
 from jointscope.graphs.solving.normal_equations import NormalEquations
-from jointscope.graphs.solving.set_problem import priors_of
 from jointscope.graphs.solving.shared_layout import SharedLayout
 from jointscope.robots.model.robot import Robot
 
@@ -65,11 +66,8 @@ class MotionSummary:
         calibrations = tuple(bag.calibration for bag in result.bags)
         estimate = Estimate(tuple(bag.states for bag in result.bags), calibrations)
         A, g = _without_blocks(problems, estimate, eliminations_of(problems, estimate))
-        names, p = calibrations[0].names, len(calibrations[0].names)
-        sigmas = np.array([each.sigma for each in result.parameters[:p]])
-        sigmas = sigmas / np.array([result.sigma_inflation.get(name, 1.0) for name in names])
-        sigmas = sigmas / calibrations[0].value_by_coordinate
-        covariance = result.correlation[:p, :p] * np.outer(sigmas, sigmas)
+        names = calibrations[0].names
+        _, covariance, _ = coordinates_told(result, names)
         samples = sum(len(placed.factor) for problem in problems for placed in problem.sensors)
         return MotionSummary(robot, names, calibrations[0].dynamics, A, g, covariance, samples)
 
@@ -83,15 +81,7 @@ class MotionSummary:
 
     def linearize(self, x: Array, calibration: Calibration) -> NormalEquations:
         """Normal equations of the shared values; the cost is that above the least one."""
-        system = NormalEquations.zeros(0, 1, calibration.size)
-        places = [calibration.names.index(name) for name in self.names]
-        columns = np.arange(calibration.size)[calibration.columns[DYNAMICS]][places]
-        away = calibration.dynamics[places] - self.at
-        pull = self.information @ away
-        system.C[np.ix_(columns, columns)] += self.information
-        system.g_p[columns] += self.slope + pull
-        system.cost += self._depth + float(self.slope @ away) + 0.5 * float(away @ pull)
-        return system
+        return NormalEquations.gaussian(calibration, self.names, self.at, self.information, self.slope, self._depth)
 
     def moved(self, calibration: Calibration) -> float:
         """How far values went from where the motion was linearised, in sigmas of all kinds, the largest one."""
@@ -112,24 +102,11 @@ def _without_blocks(
     problems: Sequence[BagProblem], estimate: Estimate, eliminations: Sequence[Elimination]
 ) -> tuple[Array, Array]:
     """Information on the dynamic parameters and slope by them, all other blocks and their priors eliminated."""
-    calibrations = estimate.calibrations
-    shared = SharedLayout.of(calibrations, len(problems))
-    H, g = np.zeros((shared.size, shared.size)), np.zeros(shared.size)
-    for bag, elimination in enumerate(eliminations):
-        index = shared.indices(bag)
-        H[np.ix_(index, index)] += elimination.S
-        g[index] += elimination.s
-    for prior, piece in priors_of(problems, calibrations):
-        if prior.blocks == (DYNAMICS,):
-            continue
-        linear = prior.linearize((), calibrations[piece])
-        for block, J in linear.by_block.items():
-            columns, whitened = shared.places[piece][block], J[0] / prior.sigmas[:, None]
-            H[columns, columns] += whitened.T @ whitened
-            g[columns] += whitened.T @ (linear.residual[0] / prior.sigmas)
+    shared = SharedLayout.of(estimate.calibrations, len(problems))
+    H, g = reduced_system(problems, eliminations, shared, estimate.calibrations, without=(DYNAMICS,))
     kept = np.zeros(shared.size, dtype=bool)
     kept[shared.columns[DYNAMICS]] = True
-    others = H[np.ix_(kept, ~kept)] @ np.linalg.inv(H[np.ix_(~kept, ~kept)]) if np.any(~kept) else np.zeros((0, 0))
-    if not np.any(~kept):
+    if np.all(kept):
         return H, g
+    others = H[np.ix_(kept, ~kept)] @ np.linalg.inv(H[np.ix_(~kept, ~kept)])
     return H[np.ix_(kept, kept)] - others @ H[np.ix_(~kept, kept)], g[kept] - others @ g[~kept]

@@ -268,8 +268,9 @@ def reduced_system(
     eliminations: Sequence[Elimination],
     shared: SharedLayout,
     calibrations: Sequence[Calibration],
+    without: Sequence[str] = (),
 ) -> tuple[Array, Array]:
-    """Hessian and gradient on the shared values of all recordings, states eliminated, priors added."""
+    """Hessian and gradient on the shared values, states eliminated, priors added but those `without` some blocks."""
     H, g = np.zeros((shared.size, shared.size)), np.zeros(shared.size)
     for bag, elimination in enumerate(eliminations):
         index = shared.indices(bag)
@@ -278,6 +279,8 @@ def reduced_system(
     for prior, piece in priors_of(problems, calibrations):
         linear = prior.linearize((), calibrations[piece])
         for block, J in linear.by_block.items():
+            if block in without:
+                continue
             columns = shared.places[piece][block]
             J = J[0] / prior.sigmas[:, None]
             H[columns, columns] += J.T @ J

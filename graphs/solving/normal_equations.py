@@ -9,14 +9,14 @@ States form a chain, so the Hessian is block tridiagonal with a border for the s
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
 
-from jointscope.factors.calibration import Calibration
+from jointscope.factors.calibration import DYNAMICS, Calibration
 from jointscope.factors.factor import Factor, Linearization
 from jointscope.graphs.problem.bag_problem import BagProblem
 from jointscope.graphs.problem.sensor_placement import Placed
@@ -73,6 +73,30 @@ class NormalEquations:
             np.zeros(m),
             *parts,
         )
+
+    @staticmethod
+    def gaussian(
+        calibration: Calibration, names: Sequence[str], at: Array, A: Array, g: Array | None = None, cost: float = 0.0
+    ) -> NormalEquations:
+        """What a Gaussian on some dynamic parameters says of the shared values; it has no states.
+
+        Args:
+            calibration: shared values.
+            names: of the parameters, shape (p,); there may be others beside.
+            at: their coordinates where slope and cost are these, shape (p,).
+            A: information, shape (p, p).
+            g: slope, shape (p,); None for the least cost.
+            cost: there.
+        """
+        system = NormalEquations.zeros(0, 1, calibration.size)
+        places = [calibration.names.index(name) for name in names]
+        columns = np.arange(calibration.size)[calibration.columns[DYNAMICS]][places]
+        away = calibration.dynamics[places] - at
+        pull, slope = A @ away, np.zeros(len(away)) if g is None else g
+        system.C[np.ix_(columns, columns)] += A
+        system.g_p[columns] += slope + pull
+        system.cost += cost + float(slope @ away) + 0.5 * float(away @ pull)
+        return system
 
 
 def build(
