@@ -48,7 +48,7 @@ def ways_rows(robot: Robot, data: Path, tell: Tell) -> dict[str, Any]:
     _, logarithm, _ = logarithm_begin(problems, [])
     balance = calibrate_frequency(robot, recordings).robot
     ways = {
-        "logarithm of the matrix": dict(zip(logarithm.names, logarithm.values.tolist(), strict=True)),
+        "logarithm of the matrix": logarithm.by_name,
         "torque balance, the default": {name: balance.parameters[name].value for name in truth},
     }
     tell("| largest error, made elsewhere, two poses | drives | bearings | dampers of drives |")

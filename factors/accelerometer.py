@@ -78,7 +78,7 @@ class AccelerometerFactor(SensorFactor[Accelerometer]):
         return Linearization(residual, (by_state,), by_block)
 
     def _force(self, x: Array, calibration: Calibration) -> SpecificForce:
-        values = {**self.fixed, **dict(zip(calibration.names, calibration.values.tolist(), strict=True))}
+        values = {**self.fixed, **calibration.by_name}
         lever = np.array([values[name] for name in self.sensor.lever])
         motion = x[:, self.layout.q_link], x[:, self.layout.v_link], x[:, self.layout.size :]
         return specific_force(self.tree, self.body, lever, *motion, self.gravity)

@@ -96,6 +96,11 @@ class Calibration:
         return np.where(self.positive, np.exp(np.where(self.positive, self.dynamics, 0.0)), self.dynamics)
 
     @property
+    def by_name(self) -> dict[str, float]:
+        """Values of the dynamic parameters by full name."""
+        return dict(zip(self.names, self.values.tolist(), strict=True))
+
+    @property
     def value_by_coordinate(self) -> Array:
         """D value / d coordinate of each dynamic parameter, shape (p,)."""
         return np.where(self.positive, self.values, 1.0)

@@ -93,7 +93,7 @@ class DistortedFactor(SeenThrough[GyroFactor | LinkEncoderFactor | MotorEncoderF
         return residual + self.inner.measured - self.inner.sensor.zero
 
     def _values(self, calibration: Calibration) -> dict[str, float]:
-        return {**self.fixed, **dict(zip(calibration.names, calibration.values.tolist(), strict=True))}
+        return {**self.fixed, **calibration.by_name}
 
     def _error(self, here: EffectAt, reading: Array, p: Mapping[str, float]) -> Array:
         return np.asarray(np.real(self._law(here, reading, p)), dtype=np.float64)

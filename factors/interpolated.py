@@ -127,7 +127,7 @@ class InterpolatedFactor(SeenThrough[Factor]):
         return (0.0, {}) if self.late is None else self.late.variance(self._named(calibration))
 
     def _named(self, calibration: Calibration) -> dict[str, float]:
-        return {**self.fixed, **dict(zip(calibration.names, calibration.values.tolist(), strict=True))}
+        return {**self.fixed, **calibration.by_name}
 
     def _by_parameters(
         self,

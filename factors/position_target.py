@@ -67,7 +67,7 @@ class PositionTargetFactor(SensorFactor[PositionTarget]):
         return Linearization(predicted - self.measured, (by_state,), by_block)
 
     def _values(self, calibration: Calibration) -> dict[str, float]:
-        return {**self.fixed, **dict(zip(calibration.names, calibration.values.tolist(), strict=True))}
+        return {**self.fixed, **calibration.by_name}
 
 
 def _right_jacobian(turn: Array) -> Array:

@@ -63,7 +63,7 @@ def calibrate_trial(
             problems = [*still, summary.of_robot(robot)]
             solution = _solved(problems, common)
             common = solution.estimate.calibrations[0].carried_to(common)
-            there = summary_at(summary, _with(robot, common)).without_friction()
+            there = summary_at(summary, robot.with_values(common.by_name)).without_friction()
             if _goes_on(problems, solution, summary, there) < AGREES:
                 break
             summary = there
@@ -72,7 +72,7 @@ def calibrate_trial(
         return None
     assert base.motion is not None
     own = [Calibration.of(robot).with_points(c.own).with_points(found.common) for c in base.motion.calibrations]
-    tried = _with(robot, found)
+    tried = robot.with_values(found.by_name)
     return SharedModel(
         tried, replace(base.motion, robot=tried, calibrations=tuple(own)), None, poses, tuple(at_rest), False
     )
@@ -90,10 +90,6 @@ def _solved(problems: list[SetProblem], common: Calibration) -> Solution:
     if not (solution.converged or solution.flat):
         raise SolveError(f"no convergence after {len(solution.iterations)} iterations over all kinds")
     return solution
-
-
-def _with(robot: Robot, found: Calibration) -> Robot:
-    return robot.with_values(dict(zip(found.names, found.values.tolist(), strict=True)))
 
 
 def _goes_on(

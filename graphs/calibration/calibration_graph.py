@@ -112,7 +112,7 @@ class CalibrationGraph:
     def parameters(self, values: gtsam.Values) -> dict[str, float]:
         """Values of all free parameters in their units, by name."""
         found = extract_calibration(values, self.like, (DYNAMICS,))
-        return dict(zip(found.names, found.values.tolist(), strict=True))
+        return found.by_name
 
     def sigmas(self, values: gtsam.Values) -> dict[str, float]:
         """Standard deviations of all free parameters in their units, by `gtsam.Marginals`.

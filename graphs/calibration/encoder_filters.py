@@ -121,7 +121,7 @@ def lacking_filter(stage: WholeStage, solved: Solved) -> LackingEffect | None:
     if not fall > 0.0:
         return None
     calibration = filtered.solution.estimate.calibrations[0]
-    values = dict(zip(calibration.names, calibration.values.tolist(), strict=True))
+    values = calibration.by_name
     return LackingEffect(effect, owner, float(chdtrc(1.0, 2.0 * fall)), fall, values, tried=True)
 
 

@@ -97,7 +97,7 @@ def external_torques_of(problem: BagProblem, x: Array, calibration: Calibration)
         x: smoothed states, shape (m + 1, d).
         calibration: values and biases.
     """
-    robot = problem.robot.with_values(dict(zip(calibration.names, calibration.values.tolist(), strict=True)))
+    robot = problem.robot.with_values(calibration.by_name)
     recording = problem.recording
     known = {**leaving_standstill_out(robot, recording).sticking, **recording.sticking}
     if known != recording.sticking:

@@ -121,7 +121,7 @@ def derived_results(robot: Robot, calibration: Calibration, covariance: Array) -
         covariance: of the shared values, whose first ones are the free parameters' coordinates, shape (s, s).
     """
     before = robot.values
-    now = before | dict(zip(calibration.names, calibration.values.tolist(), strict=True))
+    now = before | calibration.by_name
     count = len(calibration.names)
     scale = np.asarray(calibration.value_by_coordinate)
     of_values = covariance[:count, :count] * np.outer(scale, scale)

@@ -114,7 +114,7 @@ def _telling(problems: Sequence[BagProblem], asked: Sequence[str]) -> list[BagPr
 def _turns_over_in_sight(problems: Sequence[BagProblem], found: Calibration, asked: Sequence[str]) -> bool:
     """Whether the friction of some joints turns over at speeds that their encoder tells from none."""
     robot, recordings = problems[0].robot, [problem.recording for problem in problems]
-    values = dict(zip(found.names, found.values.tolist(), strict=True))
+    values = found.by_name
     return all(
         values[f"{joint}.{SHARPNESS}"] * slowest_seen(robot, recording, joint) < SEEN
         for joint in asked

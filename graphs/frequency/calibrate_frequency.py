@@ -149,7 +149,7 @@ def calibrate_frequency(
     index = calibration.columns[DYNAMICS]
     covariance = np.asarray(posteriors([summary], settled)[1])[index, index]
     sigmas = np.sqrt(np.diag(covariance)) * calibration.value_by_coordinate
-    found = robot.with_values(dict(zip(calibration.names, calibration.values.tolist(), strict=True)))
+    found = robot.with_values(calibration.by_name)
     told = dict(zip(calibration.names, sigmas.tolist(), strict=True))
     found = found_at.told(replace(found, parameters=with_sigmas(found.parameters, told)))
     report("done", 1.0)

@@ -121,7 +121,7 @@ class FrequencySet:
     def values(self, calibration: Calibration) -> dict[str, float]:
         """Values of all parameters, those that are held included."""
         held = {name: p.value for name, p in self.robot.parameters.items() if p.fixed}
-        return held | dict(zip(calibration.names, calibration.values.tolist(), strict=True))
+        return held | calibration.by_name
 
     def linearize(self, x: Array, calibration: Calibration) -> NormalEquations:
         """Normal equations of the shared values."""

@@ -130,7 +130,7 @@ def solve_all_kinds(
         graph = AllKinds(poses, summary, rests, problems, solution)
         if summary is None:
             break
-        found = dict(zip(graph.calibration.names, graph.calibration.values.tolist(), strict=True))
+        found = graph.calibration.by_name
         there = summary_at(summary, near.with_values(found))
         if moved(graph.calibration.dynamics, graph.covariance, summary, there) < AGREES:
             break

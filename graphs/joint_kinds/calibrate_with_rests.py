@@ -115,11 +115,11 @@ def calibrate_with_rests(
     likely = graph.calibration
     at, covariance, said = _posterior(placed, graph)
     sigmas = np.sqrt(np.diag(covariance)) * at.value_by_coordinate
-    found = placed.with_values(dict(zip(at.names, at.values.tolist(), strict=True)))
+    found = placed.with_values(at.by_name)
     found = replace(found, parameters=with_sigmas(found.parameters, dict(zip(at.names, sigmas.tolist(), strict=True))))
     if graph.poses is not None:
         found = replace(found, poses=graph.poses.robot.poses)
-    peak = placed.with_values(dict(zip(likely.names, likely.values.tolist(), strict=True)))
+    peak = placed.with_values(likely.by_name)
     report("done", 1.0)
     return WithRests(
         robot=found,

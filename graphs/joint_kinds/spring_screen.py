@@ -57,7 +57,7 @@ def screened_springs(
     if not tried_ones:
         return []
     mixed, _, _ = logarithm_begin([first_stage(robot, pose) for pose in poses], [])
-    robot = robot.with_values(dict(zip(mixed.names, mixed.values.tolist(), strict=True)))
+    robot = robot.with_values(mixed.by_name)
     before, _ = _few_stages(robot, [first_stage(robot, pose) for pose in poses])
     found = []
     for candidate in tried_ones:
@@ -85,7 +85,7 @@ def _begin(robot: Robot, hypothesis: ArmHypothesis) -> float:
 def _few_stages(robot: Robot, problems: Sequence[FrequencySet]) -> tuple[list[float], Robot]:
     """How unlikely each recording is after them, and the robot with their values."""
     now, at, _ = tried(problems, [], Calibration.of(robot))
-    values = dict(zip(at.names, at.values.tolist(), strict=True))
+    values = at.by_name
     return [problem.stage.unlikely for problem in now], robot.with_values(values)
 
 

@@ -66,7 +66,7 @@ class LockedSet:
     def rows(self, calibration: Calibration) -> tuple[RigidRows, Array]:
         """Residuals, and their derivatives by all shared values, shape (m, k, p)."""
         robot, found = self.robot, self.readings
-        values = {**robot.values, **dict(zip(calibration.names, calibration.values.tolist(), strict=True))}
+        values = {**robot.values, **calibration.by_name}
         transmission = Transmission(robot, calibration.names)
         A = transmission.inverse(values)
         own = calibration[ZEROS]

@@ -273,7 +273,7 @@ def _result(
     first, index = calibrations[0], calibrations[0].columns[DYNAMICS]
     own = covariance[index, index]
     sigmas = np.sqrt(np.diag(own)) * first.value_by_coordinate
-    found = robot.with_values(dict(zip(first.names, first.values.tolist(), strict=True)))
+    found = robot.with_values(first.by_name)
     parameters = with_sigmas(found.parameters, dict(zip(first.names, sigmas.tolist(), strict=True)))
     assert robot.poses is not None
     scale, turning = problems[0].repeatability, problems[0].turning

@@ -129,7 +129,7 @@ class PoseSet:
     def values(self, calibration: Calibration) -> dict[str, float]:
         """Values of all parameters, those that are held included."""
         held = {name: p.value for name, p in self.robot.parameters.items() if p.fixed}
-        return held | dict(zip(calibration.names, calibration.values.tolist(), strict=True))
+        return held | calibration.by_name
 
     def point(self, calibration: Calibration, e: Array | None = None) -> SaggingPoint:
         """Rows of what was seen: in the axes of the tracker, or in those of the base where contacts hold the target.

@@ -250,7 +250,7 @@ def without_outliers(
 
 def with_fitted(robot: Robot, known: Sequence[Calibration]) -> Robot:
     """A robot with the values of a fit."""
-    return robot.with_values(dict(zip(known[0].names, known[0].values.tolist(), strict=True)))
+    return robot.with_values(known[0].by_name)
 
 
 def without_hidden(

@@ -23,7 +23,7 @@ def knowing(robot: Robot) -> Robot:
 
 def with_known_values(problem: BagProblem, calibration: Calibration) -> tuple[BagProblem, Calibration]:
     """The recording and the shared values that are left, of the robot with the values of a calibration."""
-    values = dict(zip(calibration.names, calibration.values.tolist(), strict=True))
+    values = calibration.by_name
     known = problem.of_robot(knowing(problem.robot.with_values(values))).with_noise(problem.dynamics.steps.noise)
     return known, carried(calibration, Calibration.of(known.robot))
 

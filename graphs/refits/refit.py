@@ -160,7 +160,7 @@ def _followed(problems: Sequence[BagProblem], start: Estimate) -> Estimate:
 
 def _with_short_impacts(problems: Sequence[BagProblem], estimate: Estimate) -> tuple[list[BagProblem], Estimate]:
     """With short steps where springs meet edges of dead zones, as a calibration has them."""
-    values = dict(zip(estimate.calibrations[0].names, estimate.calibrations[0].values.tolist(), strict=True))
+    values = estimate.calibrations[0].by_name
     pairs = [p.divided(x, values) for p, x in zip(problems, estimate.states, strict=True)]
     return [p for p, _ in pairs], Estimate(tuple(x for _, x in pairs), estimate.calibrations)
 
@@ -209,7 +209,7 @@ def pieces_of(base: BaseModel, robot: Robot, spans: Sequence[Span]) -> tuple[lis
 
 def _with(robot: Robot, calibration: Calibration) -> Robot:
     """The robot with the values of a calibration."""
-    values = dict(zip(calibration.names, calibration.values.tolist(), strict=True))
+    values = calibration.by_name
     sensors: dict[str, Sensor] = {
         sensor.name: replace(sensor, bias=calibration.biases[sensor.name]) for sensor in robot.accelerometers
     }

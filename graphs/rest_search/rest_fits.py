@@ -55,7 +55,7 @@ class RestFit:
     @property
     def values(self) -> dict[str, float]:
         """Free values by full name."""
-        return dict(zip(self.calibration.names, self.calibration.values.tolist(), strict=True))
+        return self.calibration.by_name
 
     def costs_of(self, others: RestSet, x: Array) -> Array:
         """Minus the log likelihood of each rest that was left out, the values held, but for a constant; shape (m,).

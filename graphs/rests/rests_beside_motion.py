@@ -67,7 +67,7 @@ def with_rests(result: CalibrationResult) -> CalibrationResult:
     covariance = result.correlation[:count, :count] * np.outer(sigmas, sigmas)
     elsewhere = SaidElsewhere.of(whole, x, likeliest, covariance)
     at, found = band_posterior(whole, robot, x, likeliest, elsewhere)
-    scale, free = at.value_by_coordinate, dict(zip(at.names, at.values.tolist(), strict=True))
+    scale, free = at.value_by_coordinate, at.by_name
     spread = dict(zip(at.names, (np.sqrt(np.diag(found)) * scale).tolist(), strict=True))
     parameters = tuple(
         replace(p, value=free[p.name], sigma=spread[p.name]) if p.name in free and p.note != AT_BOUND else p

@@ -130,7 +130,7 @@ def _timing(test: ScoreTest, step: HypothesisStep) -> DriveTiming | None:
     if not np.isfinite(delay) or not np.isfinite(sigma):
         return None
     start, owner = test.calibration, step.hypothesis.here.owner
-    before = dict(zip(start.names, start.values.tolist(), strict=True))
+    before = start.by_name
     changes = {name: value - before[name] for name, value in test.values_with(step).items()}
     return DriveTiming(delay, sigma, changes, "" if owner == OWNER else owner)
 

@@ -76,7 +76,7 @@ def wrong_masses(test: ScoreTest) -> tuple[WrongMass, ...]:
     hypotheses = [
         EffectHypothesis(at, effect.parameters_at(robot, at.owner)) for at in here if not cannot_be_added(robot, at)
     ]
-    start, found = dict(zip(test.calibration.names, test.calibration.values.tolist(), strict=True)), []
+    start, found = test.calibration.by_name, []
     for step in test.steps(hypotheses):
         if not (np.all(np.isfinite(step.sizes)) and np.all(np.isfinite(step.sigmas))):
             continue

@@ -165,7 +165,7 @@ def with_current_constants(start: Calibration, robot: Robot, recordings: Sequenc
     parts = [] if sensor is None else [DriveCurrents.of(recording, robot) for recording in recordings]
     if sensor is None or not all(parts):
         return start
-    known = robot.values | dict(zip(start.names, start.values.tolist(), strict=True))
+    known = robot.values | start.by_name
     dynamics = start.dynamics.copy()
     for j, joint in enumerate(robot.joints):
         fits = [part.fit(j, j, sensor.delay, sensor.delay) for part in parts if part is not None]

@@ -40,8 +40,8 @@ class DriveChannels:
         right = [names[channel] for channel in np.argsort(own)]
         wrong = [joint for k, joint in enumerate(self.robot.joints) if own[k] != k]
         return (
-            f"{self.sensor.name}: {self.quantity}s of {' and '.join(wrong)} seem to be exchanged: so the drives explain "
-            f"them; if that is so, write `names: [{', '.join(right)}]` in {self._section}"
+            f"{self.sensor.name}: {self.quantity}s of {' and '.join(wrong)} seem to be exchanged: so the drives "
+            f"explain them; if that is so, write `names: [{', '.join(right)}]` in {self._section}"
         )
 
     def scaled(self, factors: Array, looks: tuple[str, str]) -> str:

@@ -48,7 +48,7 @@ BAND = (0.5, 10.0)  # [Hz] the regression uses motion between these frequencies
 def initial_states(problem: BagProblem, calibration: Calibration) -> Array:
     """States at all ticks, shape (m + 1, d); bearings do not tilt, memories are empty but for lags of encoders."""
     x = problem.robot.layout.from_joints(_joint_states(problem, calibration))
-    return unlagged(problem.robot, x, dict(zip(calibration.names, calibration.values.tolist(), strict=True)))
+    return unlagged(problem.robot, x, calibration.by_name)
 
 
 def _joint_states(problem: BagProblem, calibration: Calibration) -> Array:

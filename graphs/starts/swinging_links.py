@@ -33,7 +33,7 @@ def swinging_links(problem: BagProblem, calibration: Calibration, q_motor: Array
     from scipy.signal import cont2discrete, lfilter
 
     values = robot.values
-    values |= dict(zip(calibration.names, calibration.values.tolist(), strict=True))
+    values |= calibration.by_name
     still = robot.layout.from_joints(np.mean(np.hstack([q_motor, v_motor, q_motor, v_motor]), axis=0)[None, :])
     springs = problem.dynamics.model.springs(still, values)
     inertia = np.diagonal(robot.tree.mass_matrix(np.mean(q_motor, axis=0)[None, :])[0])

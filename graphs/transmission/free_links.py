@@ -135,7 +135,7 @@ class FreeLinks:
 
     def values(self, calibration: Calibration) -> dict[str, float]:
         """Values of all parameters, those that are held included."""
-        return self.robot.values | dict(zip(calibration.names, calibration.values.tolist(), strict=True))
+        return self.robot.values | calibration.by_name
 
     def rows(self, calibration: Calibration) -> list[EquationRows]:
         """All equations at the values of a calibration."""

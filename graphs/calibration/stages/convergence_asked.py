@@ -29,7 +29,7 @@ def must_converge(solution: Solution, robot: Robot, enough: float) -> None:
 def _vanishing(robot: Robot, solution: Solution) -> str:
     """A clause about effects whose sizes go to nothing, a long way for logarithms; empty if there are none."""
     calibration = solution.estimate.calibrations[0]
-    values = dict(zip(calibration.names, calibration.values.tolist(), strict=True))
+    values = calibration.by_name
     gone = [
         here.label
         for here in robot.effects

@@ -102,5 +102,5 @@ def anchored(problems: Sequence[BagProblem], calibrations: Sequence[Calibration]
     robot = problems[0].robot
     if not any(isinstance(here.effect, TimeShift) for here in robot.effects):
         return list(problems)
-    values = dict(zip(calibrations[0].names, calibrations[0].values.tolist(), strict=True))
+    values = calibrations[0].by_name
     return placed(problems, values)

@@ -105,7 +105,7 @@ class WholeStage:
     def with_short_impacts(self, solved: Solved) -> Solved:
         """The solution with short steps where springs meet edges of dead zones; blows else look like random torque."""
         problems, states, calibrations = solved.of_motions
-        known = [dict(zip(c.names, c.values.tolist(), strict=True)) for c in calibrations]
+        known = [c.by_name for c in calibrations]
         pairs = [p.divided(x, values) for p, x, values in zip(problems, states, known, strict=True)]
         now = anchored([p for p, _ in pairs], calibrations)
         if all(p is whole for (p, _), whole in zip(pairs, problems, strict=True)):

@@ -67,7 +67,7 @@ def started(robot, streams, **changes):
     robot = replace(robot, parameters={n: replace(p, **changes.get(n, {})) for n, p in robot.parameters.items()})
     problem, calibration = BagProblem.of(robot, recording), Calibration.of(robot)
     found = initial_dynamics([problem], [initial_states(problem, calibration)], calibration)
-    return dict(zip(found.names, found.values.tolist(), strict=True))
+    return found.by_name
 
 
 def truth():
