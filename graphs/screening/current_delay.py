@@ -131,14 +131,14 @@ def current_gap(robot: Robot, recordings: Sequence[Recording]) -> CurrentGap | N
     tried = tried_delays(h)
     costs = _Costs(parts)
     lefts = np.array([costs.left(late, late) for late in tried])
-    at = _lowest(lefts)
+    at = least_left(lefts)
     best = float(tried[at])
     if costs.share(best) > FITS or at in (0, len(tried) - 1):
         return None
     seen, command = best, 0.0
     if parts[0].by_volts:
         apart = np.array([costs.left(best, late) for late in tried])
-        speeds = float(tried[_lowest(apart)])
+        speeds = float(tried[least_left(apart)])
         free = any(isinstance(here.effect, CommandEffect) for here in robot.effects)
         gained = len(parts[0].times) * float(np.sum(np.log(costs.left(best, best) / costs.left(best, speeds))))
         if gained > SURE and (free or best - speeds > LATE_COMMAND * h):
@@ -180,8 +180,8 @@ def with_current_constants(start: Calibration, robot: Robot, recordings: Sequenc
     return start.with_points({DYNAMICS: dynamics})
 
 
-def _lowest(lefts: Array) -> int:
-    """Delay, of shape (k, n), with the least that is left of all channels together."""
+def least_left(lefts: Array) -> int:
+    """Which of k trials leaves the least of all n channels together, shape (k, n)."""
     return int(np.argmin(np.sum(np.log(np.maximum(lefts, 1e-300)), axis=1)))
 
 

@@ -11,7 +11,7 @@ share of a current that its drive leaves can be worked out for each of many dela
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,7 +20,7 @@ from jointscope.graphs.problem.timeline import SAME, Timeline
 from jointscope.graphs.screening.windowed_motion import windowed_motion
 from jointscope.robots.dynamics.command_path import CommandPath
 from jointscope.robots.model.robot import Robot
-from jointscope.robots.recordings.recording import Recording
+from jointscope.robots.recordings.recording import Recording, Stream
 
 Array = NDArray[np.float64]
 
@@ -39,12 +39,14 @@ class CurrentFit:
         share: root of the mean of these as a share of the channel's standard deviation.
         by_command: a [A per unit of the command].
         by_speed: b [A s/rad]; 0 where the command is no voltage.
+        at_rest: c [A].
     """
 
     left: float
     share: float
     by_command: float
     by_speed: float
+    at_rest: float
 
 
 @dataclass(frozen=True)
@@ -54,8 +56,7 @@ class DriveCurrents:
     Attributes:
         times: of the samples, shape (m,) [s].
         currents: there, shape (m, n) [A].
-        timeline: ticks of the commands.
-        u: commands that act in each step, shape (k, n).
+        timeline: ticks, and the commands that act between them.
         v: speeds of the motors at the ticks, shape (k + 1, n) [rad/s].
         by_volts: whether speeds take current away.
     """
@@ -63,7 +64,6 @@ class DriveCurrents:
     times: Array
     currents: Array
     timeline: Timeline
-    u: Array
     v: Array
     by_volts: bool
 
@@ -72,24 +72,38 @@ class DriveCurrents:
         """None where the recording is too short."""
         sensor = robot.motor_current
         assert sensor is not None
-        stream, encoder = recording.streams[sensor.name], recording.streams[robot.motor_encoder.name]
-        timeline = Timeline.of(recording, robot.command_held)
+        stream, timeline = recording.streams[sensor.name], Timeline.of(recording, robot.command_held)
+        usable = recording.are_judged(stream.times)
+        if stream.filled is not None:
+            usable &= ~stream.filled.any(axis=1)
+        path = CommandPath(timeline.ticks, timeline.u, robot.effects, robot.joints, not robot.command_held)
+        acting = replace(timeline, u=path.acting(robot.values)[0])
+        encoder = recording.streams[robot.motor_encoder.name]
+        return DriveCurrents.beside(stream, encoder, acting, "k_mi" in robot.drive_laws, usable)
+
+    @staticmethod
+    def beside(
+        currents: Stream, encoder: Stream, timeline: Timeline, by_volts: bool, usable: NDArray[np.bool_] | None = None
+    ) -> DriveCurrents | None:
+        """The same of some streams.
+
+        Args:
+            currents: one channel per joint.
+            encoder: positions of the motors.
+            timeline: with the commands that act.
+            by_volts: whether speeds take current away.
+            usable: which samples of the currents are, shape (m,); None for all.
+        """
         window = max(WINDOW, PERIODS * float(np.max(encoder.periods)))
         begin = max(timeline.ticks[0], encoder.times[0] + 2.0 * window)
         end = min(timeline.ticks[-1], encoder.times[-1] - 2.0 * window)
-        inside = (stream.times > begin + LATEST) & (stream.times < end + EARLIEST)
-        inside &= recording.are_judged(stream.times)
-        if stream.filled is not None:
-            inside &= ~stream.filled.any(axis=1)
-        found = np.flatnonzero(inside)
+        inside = (currents.times > begin + LATEST) & (currents.times < end + EARLIEST)
+        found = np.flatnonzero(inside if usable is None else inside & usable)
         if len(found) < FEWEST:
             return None
         chosen = found[:: max(len(found) // SAMPLES, 1)]
-        path = CommandPath(timeline.ticks, timeline.u, robot.effects, robot.joints, not robot.command_held)
         v = windowed_motion(encoder, np.clip(timeline.ticks, begin, end), window).v
-        by_volts = "k_mi" in robot.drive_laws
-        u = path.acting(robot.values)[0]
-        return DriveCurrents(stream.times[chosen], stream.values[chosen], timeline, u, v, by_volts)
+        return DriveCurrents(currents.times[chosen], currents.values[chosen], timeline, v, by_volts)
 
     @property
     def n(self) -> int:
@@ -107,11 +121,11 @@ class DriveCurrents:
 
     def fit(self, joint: int, channel: int, by_u: float, by_v: float) -> CurrentFit:
         """A channel by the command of a joint that is so much older, and by its speed [s]."""
-        columns = [self.u[self.steps(by_u), joint], np.ones(len(self.times))]
+        columns = [self.timeline.u[self.steps(by_u), joint], np.ones(len(self.times))]
         if self.by_volts:
             columns.append(np.interp(self.times - by_v, self.timeline.ticks, self.v[:, joint]))
         A, y = np.column_stack(columns), self.currents[:, channel]
         found, size = np.linalg.lstsq(A, y, rcond=None)[0], float(np.std(y))
         left = float(np.sum((y - A @ found) ** 2))
         share = float(np.sqrt(left / len(y))) / size if size > 0.0 else np.inf
-        return CurrentFit(left, share, float(found[0]), float(found[2]) if self.by_volts else 0.0)
+        return CurrentFit(left, share, float(found[0]), float(found[2]) if self.by_volts else 0.0, float(found[1]))

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.signal import lfilter
 
-from jointscope.graphs.screening.current_delay import FITS, current_gap, tried_delays
+from jointscope.graphs.screening.current_delay import FITS, current_gap, least_left, tried_delays
 from jointscope.graphs.screening.drive_channels import CLEARLY, DriveChannels, belongs_to, thousands
 from jointscope.graphs.screening.drive_currents import DriveCurrents
 from jointscope.robots.model.command_words import robot_argument
@@ -83,7 +83,7 @@ def _smoothed(robot: Robot, sensor: MotorCurrent, drives: DriveCurrents) -> list
     if np.any(plain * np.std(drives.currents, axis=0) < NOISE * sensor.sigmas):
         return []
     shares = np.array([left(_behind_low_pass(drives, steps)) for steps in SMOOTHINGS])
-    best = int(np.argmin(np.sum(np.log(np.maximum(shares, 1e-12)), axis=1)))
+    best = least_left(shares)
     if np.any(shares[best] > plain / CLEARLY):
         return []
     return [
@@ -96,8 +96,8 @@ def _smoothed(robot: Robot, sensor: MotorCurrent, drives: DriveCurrents) -> list
 def _behind_low_pass(drives: DriveCurrents, steps: float) -> DriveCurrents:
     """The same signals behind a first-order low-pass with so many steps as time constant."""
     keep = float(np.exp(-1.0 / steps))
-    u, v = (lfilter([1.0 - keep], [1.0, -keep], signal, axis=0) for signal in (drives.u, drives.v))
-    return replace(drives, u=np.asarray(u), v=np.asarray(v))
+    u, v = (lfilter([1.0 - keep], [1.0, -keep], signal, axis=0) for signal in (drives.timeline.u, drives.v))
+    return replace(drives, timeline=replace(drives.timeline, u=np.asarray(u)), v=np.asarray(v))
 
 
 def _shares(drives: DriveCurrents, late: float) -> Array:

@@ -12,7 +12,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from jointscope.graphs.screening.windowed_motion import windowed_motion
+from jointscope.graphs.problem.timeline import Timeline
+from jointscope.graphs.screening.current_delay import FITS, least_left, tried_delays
+from jointscope.graphs.screening.drive_currents import DriveCurrents
 from jointscope.robots.recordings.recording import Stream
 from jointscope.tools.init.estimates.drive_values import Drives
 from jointscope.tools.init.estimates.measured_robot import role_stream
@@ -23,9 +25,6 @@ from jointscope.tools.init.streams.sensor_noise import NoiseGuess, guess_each
 Array = NDArray[np.float64]
 
 VOLTAGES = ("V", "duty")  # units of commands whose motors lose current by their speed
-FITS = 0.3  # of an effort's standard deviation that its drive may leave
-WINDOW, PERIODS, SAMPLES, FEWEST = 0.01, 3.0, 4000, 200
-LATEST = 0.03  # [s]
 
 
 @dataclass(frozen=True)
@@ -64,27 +63,18 @@ def guess_currents(roles: Roles, encoder: Stream, drive: Drives) -> GuessedCurre
     chosen, joints, drives = roles.motor_effort, roles.joints, drive.joints
     if chosen is None or drive.unit[0] not in VOLTAGES:
         return None
-    command = role_stream(roles.command, joints)
-    effort = role_stream(chosen, joints)
-    window = max(WINDOW, PERIODS * float(np.max(encoder.periods)))
-    begin = max(command.times[0] + LATEST, encoder.times[0] + 2.0 * window)
-    end = min(command.times[-1], encoder.times[-1] - 2.0 * window)
-    inside = np.flatnonzero((effort.times > begin) & (effort.times < end))
-    if len(inside) < FEWEST:
+    command, effort = role_stream(roles.command, joints), role_stream(chosen, joints)
+    ticks = np.append(command.times, command.times[-1] + np.min(command.periods))
+    seen = DriveCurrents.beside(effort, encoder, Timeline(ticks, command.values), by_volts=True)
+    if seen is None:
         return None
-    rows = inside[:: max(len(inside) // SAMPLES, 1)]
-    times = effort.times[rows]
-    v = windowed_motion(encoder, times, window).v
-    h = float(np.min(command.periods))
-    shares, slopes = [], []
-    for late in h * (np.arange(np.ceil(LATEST / h)) + 0.5):  # a command jumps: each gap between two is tried once
-        acting = command.values[np.searchsorted(command.times, times - late, side="right") - 1]
-        found = [_fit(effort.values[rows, j], acting[:, j], v[:, j]) for j in range(len(joints))]
-        shares.append([share for share, *_ in found])
-        slopes.append([by for _, *by in found])
-    best = int(np.argmin(np.sum(np.log(np.maximum(shares, 1e-12)), axis=1)))
-    by_command, by_speed, offset = np.array(slopes[best]).T
-    if max(shares[best]) > FITS or np.any(by_command * by_speed >= 0.0):  # a speed takes away what a command gives
+    tried = tried_delays(seen.h)
+    fits = [[seen.fit(j, j, late, late) for j in range(len(joints))] for late in tried]
+    shares = np.array([[fit.share for fit in each] for each in fits])
+    best = least_left(shares)
+    by_command, by_speed, offset = np.array([(fit.by_command, fit.by_speed, fit.at_rest) for fit in fits[best]]).T
+    share = float(shares[best].max())
+    if share > FITS or np.any(by_command * by_speed >= 0.0):  # a speed takes away what a command gives
         return None
     turned = np.array([drive.sign for drive in drives]) * by_command
     return GuessedCurrents(
@@ -95,15 +85,5 @@ def guess_currents(roles: Roles, encoder: Stream, drive: Drives) -> GuessedCurre
         tuple(np.abs(by_speed).tolist()),
         tuple((np.sign(turned) * offset).tolist()),
         tuple(d.is_lost("gain") for d in drives),
-        max(shares[best]),
+        share,
     )
-
-
-def _fit(y: Array, u: Array, v: Array) -> tuple[float, float, float, float]:
-    """Share of a channel that command and speed leave, the factors of both, and the constant."""
-    size = float(np.std(y))
-    if size == 0.0:
-        return np.inf, 0.0, 0.0, 0.0
-    A = np.column_stack([u, v, np.ones(len(u))])
-    found = np.linalg.lstsq(A, y, rcond=None)[0]
-    return float(np.std(y - A @ found)) / size, float(found[0]), float(found[1]), float(found[2])
