@@ -5,7 +5,6 @@ from __future__ import annotations
 
 from types import SimpleNamespace
 
-import numpy as np
 import pytest
 
 from jointscope.graphs.calibration.stages.convergence_asked import must_converge
@@ -17,7 +16,7 @@ from jointscope.robots.files.robot_file import load_robot
 
 def unfinished(robot, sizes):
     values = {name: parameter.value for name, parameter in robot.parameters.items()} | sizes
-    calibration = SimpleNamespace(names=tuple(values), values=np.array(list(values.values())))
+    calibration = SimpleNamespace(by_name=values)
     estimate = SimpleNamespace(calibrations=(calibration,))
     return SimpleNamespace(converged=False, flat=False, iterations=[Iteration(9.0, 8.0, 1.0, 0.9)], estimate=estimate)
 
