@@ -130,9 +130,11 @@ def run(case: Case, robot: Robot, messages: list[Message], lagged_too: bool = Tr
     return Run(*judged, nis, dof, np.array(wall), estimator)
 
 
-def driven(estimator: FixedLagEstimator, messages: Iterable[Message]) -> Iterator[Cycle]:
-    """What a controller gets in every cycle."""
+def driven(estimator: FixedLagEstimator, messages: Iterable[Message], idle: bool = True) -> Iterator[Cycle]:
+    """What a controller gets in every cycle; without `idle`, in those in which something arrived."""
     for _, arrived in cycles(messages):
+        if not (arrived or idle):
+            continue
         wall, cpu = time.perf_counter(), time.thread_time()
         for message in arrived:
             estimator.sample(message.stream, message.stamp, message.values)

@@ -146,7 +146,7 @@ class DynamicsFactor(ABC):
         return (u, u) if rise is None else (u - 0.5 * rise, u + 0.5 * rise)
 
     def _add_commands(self, by_parameter: tuple[Array, Array], calibration: Calibration, middle: Accelerations) -> None:
-        """Derivative of the rate defects by what effects do to the commands; positions feel it h/2 less."""
+        """Derivative of the rate defects by what effects do to the commands, which positions follow by the rule."""
         slopes = self.steps.acting(self.model.named(calibration.values))[1]
         if not slopes:
             return

@@ -3,10 +3,15 @@
 
 Variables: X(k), X(k+1), dynamics. Disturbances are torques: the link rows are turned from velocities into impulses by
 the mass matrix at the measured angles (a known weight W, stated on the mean inertia of each joint so that it keeps the
-unit of a velocity). The residual of step k has two halves: velocities d_v and positions d_q - (h/2) d_v. White noise on
-the velocities with density s makes the two halves independent, with standard deviations s sqrt(h) and s h sqrt(h/12);
-so the positions follow from the velocities and need no noise of their own. With `independent` position noise (eq. 36 of
-Schuethe et al. 2016) the second half is d_q itself.
+unit of a velocity). The residual of step k has two halves: velocities d_v and positions. White noise W of density s on
+the velocities leaves the defects
+
+    d_v = s W(h),   d_q = s int W - (h/2) s W(h)   where positions follow the mean velocity of both ends,
+                    d_q = s int W                  where they follow the velocity at the beginning (euler),
+
+so int W - (h/2) W(h), which is independent of W(h), is the second half: d_q itself, and with Euler's rule
+d_q - (h/2) d_v. Standard deviations are s sqrt(h) and s h sqrt(h/12); the positions follow from the velocities and need
+no noise of their own. With `independent` position noise (eq. 36 of Schuethe et al. 2016) the second half is always d_q.
 """
 
 from __future__ import annotations
@@ -41,6 +46,7 @@ class Steps:
         sliding: how sharply the dry friction of each joint turns over at the beginning and the end of each step, as a
             part of what its law says, shape (m, 2, n); None where all is as it says.
         rise: by how much u rises over each step, shape (m, n), where no path says it; None where it is constant.
+        behind: part of h/2 d_v by which positions of the rule lag behind a torque that acts throughout; see `behind`.
     """
 
     h: Array
@@ -53,6 +59,7 @@ class Steps:
     free: Array | None = None
     sliding: Array | None = None
     rise: Array | None = None
+    behind: float = 0.0
 
     def __len__(self) -> int:
         return len(self.h)
@@ -147,8 +154,13 @@ class Steps:
         weight = np.zeros((len(d_v), 0, 0)) if self.weight is None else self.weight
         found = np.empty((*shape[:2], d_v[:1, 0].size))
         parts = (np.ascontiguousarray(d.reshape(*d.shape[:2], -1)) for d in (d_v, d_q))
-        combine(np.ascontiguousarray(weight), 0.5 * self.h, *parts, found)
+        combine(np.ascontiguousarray(weight), 0.5 * self.behind * self.h, *parts, found)
         return found.reshape(shape)
+
+
+def behind(rule: str) -> float:
+    """1 for a rule whose positions follow the velocity at the beginning of a step, 0 for one that takes both ends."""
+    return 1.0 if rule == "euler" else 0.0
 
 
 def rate_sigmas(noise: ProcessNoise, h: Array) -> Array:

@@ -101,12 +101,12 @@ def step_derivatives(
 
 
 @compiled
-def combine(weight: Array, half: Array, d_v: Array, d_q: Array, combined: Array) -> None:
-    """Rows whose noise is independent: W d_v, then W (d_q - h/2 d_v).
+def combine(weight: Array, lag: Array, d_v: Array, d_q: Array, combined: Array) -> None:
+    """Rows whose noise is independent: W d_v, then W (d_q - lag d_v).
 
     Args:
         weight: W of the link rows of each step, shape (m, n, n); n = 0 for the identity.
-        half: h/2 of each step, shape (m,) [s].
+        lag: by which positions are behind in each step, shape (m,) [s].
         d_v: defects of rates, or derivatives of them, shape (m, r, c).
         d_q: the same of positions, shape (m, k, c).
         combined: receives the rows, shape (m, r + k, c).
@@ -119,11 +119,11 @@ def combine(weight: Array, half: Array, d_v: Array, d_q: Array, combined: Array)
                 combined[step, i, c] = d_v[step, i, c] if i >= n else 0.0
         for i in range(k):
             for c in range(columns):
-                x = d_q[step, i, c] - half[step] * d_v[step, i, c]
+                x = d_q[step, i, c] - lag[step] * d_v[step, i, c]
                 combined[step, r + i, c] = x if i >= n else 0.0
         for i in range(n):
             for j in range(n):
                 w = weight[step, i, j]
                 for c in range(columns):
                     combined[step, i, c] += w * d_v[step, j, c]
-                    combined[step, r + i, c] += w * (d_q[step, j, c] - half[step] * d_v[step, j, c])
+                    combined[step, r + i, c] += w * (d_q[step, j, c] - lag[step] * d_v[step, j, c])

@@ -220,7 +220,7 @@ def _what_simpson_adds(
     segment: Segment, factor: DynamicsFactor, ticks: NDArray[np.intp], linear: Linearization
 ) -> Array:
     """Defects by Simpson's rule minus those of the model's own, shape (s, rows)."""
-    simpson = SimpsonDynamics(factor.model, factor.steps, factor.joints)
+    simpson = SimpsonDynamics(factor.model, replace(factor.steps, behind=0.0), factor.joints)
     x = segment.signals.x
     return simpson.residual((x[ticks], x[ticks + 1]), segment.calibration) - linear.residual
 

@@ -44,7 +44,7 @@ ROBOT = load_robot("doggy")
 MIMICKING = Path(__file__).parents[1] / "graphs/mimicking_doggy.urdf"
 PAPER = load_robot("doggy_paper")
 M = 5
-ROUNDING = 1e-5  # a residual of size 0.1 differenced at 1e-6 keeps 2e-11 of noise, 2e-6 of this
+ROUNDING = 2e-5  # a residual of size 0.3 differenced at 1e-6 keeps 6e-11 of noise, 3e-6 of this
 
 
 def _factors():
@@ -285,4 +285,4 @@ def test_a_chain_linearizes_as_its_pairs_do():
             (*chain.by_state, chain.by_block["dynamics"]), (*pairs.by_state, pairs.by_block["dynamics"]), strict=True
         ):
             size = np.abs(b).max(axis=(0, 2), keepdims=True)
-            assert np.max(np.abs(a - b) / size) < 1e-5
+            assert np.max(np.abs(a - b) / np.where(size == 0.0, 1.0, size)) < 1e-5  # a rule may have nothing there

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Process noise of one step at one state: the whitening of the defects of the dynamics factor, and its inverse.
 
-The rows and sigmas of `factors.step`: velocity defects d_v and d_q - (h/2) d_v, link rows turned into impulses by
+The rows and sigmas of `factors.step`: velocity defects d_v and position defects, link rows turned into impulses by
 W = M(q) / (inertia alone), with standard deviations s sqrt(h) and s h sqrt(h/12).
 """
 
@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import lapack
 
-from jointscope.factors.step import position_sigmas, rate_sigmas
+from jointscope.factors.step import behind, position_sigmas, rate_sigmas
 from jointscope.robots.model.robot import Robot
 
 Array = NDArray[np.float64]
@@ -28,6 +28,7 @@ class StepNoise:
 
     def __init__(self, robot: Robot):
         self._layout, noise = robot.layout, robot.noise
+        self._behind = behind(robot.choices.integrator)
         self._process, self._integrated = noise, noise.model == "integrated"
         # the bodies of the URDF, as where the noise was estimated; effects on inertia do not enter the weights
         self._tree = robot.kinematic_tree
@@ -71,14 +72,14 @@ class StepNoise:
         T[self._position_rows, layout.positions], G[layout.positions, self._position_rows] = 1.0 / position, position
         if not self._integrated:
             return T, G
-        half, moved = 0.5 * h, layout.velocities
-        T[self._position_rows, moved], G[layout.positions, self._rate_rows[:k]] = -half / position, half * sigma[:k]
+        lag, moved = 0.5 * self._behind * h, layout.velocities
+        T[self._position_rows, moved], G[layout.positions, self._rate_rows[:k]] = -lag / position, lag * sigma[:k]
         n, q, v = layout.n_link, layout.q_link, layout.v_link
         W = self._tree.weighing_inertia(x[None, q])[0] / self._alone[:, None]
         W_inverse = lapack.dgesv(W, self._eye)[2]
         rates, positions = slice(0, n), slice(len(sigma), len(sigma) + n)
         by_position = W / position[:n, None]
-        T[rates, v], T[positions, q], T[positions, v] = W / sigma[:n, None], by_position, -half * by_position
+        T[rates, v], T[positions, q], T[positions, v] = W / sigma[:n, None], by_position, -lag * by_position
         by_rate = W_inverse * sigma[:n]
-        G[v, rates], G[q, rates], G[q, positions] = by_rate, half * by_rate, W_inverse * position[:n]
+        G[v, rates], G[q, rates], G[q, positions] = by_rate, lag * by_rate, W_inverse * position[:n]
         return T, G
