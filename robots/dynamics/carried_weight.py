@@ -32,17 +32,16 @@ class CarriedWeight:
     Args:
         robot: the robot.
         names: names of the free parameters.
+
+    Attributes:
+        some: whether gravity acts at all.
     """
 
     def __init__(self, robot: Robot, names: tuple[str, ...] = ()):
         self._layout, self._tree, self._names = robot.layout, StructuredTree(robot), names
         self._transmission = Transmission.of(robot, names)
         self._n = robot.n
-
-    @property
-    def some(self) -> bool:
-        """Whether gravity acts at all."""
-        return bool(np.any(self._tree.kinematics.gravity))
+        self.some = bool(np.any(self._tree.kinematics.gravity))
 
     def on(self, joint: str, effect: JointTorque, p: Mapping[str, Any]) -> CarriedWeight | None:
         """This, if it is the load that an effect asks for.

@@ -16,13 +16,13 @@ from jointscope.robots.dynamics.bearing_springs import BearingSprings
 from jointscope.robots.dynamics.joint_springs import JointSprings, Springs
 from jointscope.robots.dynamics.law_at_one_state import (
     CoupledLawAtOneState,
-    JointLawAtOneState,
     LawAtOneState,
-    LawBehindTransmission,
+    LawsBehindTransmission,
+    side_by_side,
 )
 from jointscope.robots.dynamics.motor_torques import MotorTorques
 from jointscope.robots.dynamics.torque_terms import TorqueTerms
-from jointscope.robots.dynamics.transmission import Transmission, is_behind
+from jointscope.robots.dynamics.transmission import Transmission, parted
 from jointscope.robots.effect_kinds.joint_torque import JointTorque
 from jointscope.robots.effect_kinds.robot_torque import RobotTorque
 from jointscope.robots.model.encoder_plays import EncoderPlays
@@ -45,6 +45,7 @@ class StateRates:
         layout: of the state.
         friction_columns: columns of the velocities that the friction of each joint depends on, shape (n,).
         sharpness: k of the friction law of each joint, shape (n,) [s/rad].
+        has_kinks: whether a law of an effect may bend sharply within a step.
         plays: of its encoders, whose lags follow positions from tick to tick; None where there are none.
         play_sizes: half of each of them, shape (k,) [rad].
     """
@@ -65,6 +66,7 @@ class StateRates:
         self._torque_of_command = motors.of_command(np.ones((1, robot.n)), named)[0]
         self._coulomb = parameters.of(named, "coulomb_torque")
         self.sharpness = robot.friction_sharpness(named)
+        self._sharpest = self.sharpness.copy()
         self.friction_columns = layout.velocities_at(robot.choices.friction_velocity)
         self._rows = layout.motor_row
         n = layout.n_link
@@ -73,7 +75,13 @@ class StateRates:
         self._added = slice(n, n + robot.n) if own_rows else self._rows
         own = [layout.joints.index(joint) for joint in layout.motors]
         self._inertia = parameters.of(named, "inertia")[own]
-        self._laws = _laws(robot, springs.at(np.zeros((1, layout.size)), named), named)
+        at_zero = springs.at(np.zeros((1, layout.size)), named)
+        straight, bent = _laws(robot, at_zero, named, self.sharpness)
+        self._constant, self._laws = np.zeros(layout.n_rates), bent
+        for law in straight:
+            law.add(np.zeros(layout.size), self._constant, self._linear)
+        bends = [here.effect.bends for here in robot.effects if isinstance(here.effect, JointTorque)]
+        self.has_kinks = "sharply" in bends or any(isinstance(here.effect, RobotTorque) for here in robot.effects)
         self._kinematic = np.zeros((layout.size, layout.size))
         self._kinematic[layout.positions, layout.velocities] = 1.0
         n, m = layout.n_link, layout.n_motor
@@ -85,10 +93,19 @@ class StateRates:
             if row >= n:
                 self._by_torque[layout.v_motor.start + row - n, j] = 1.0 / self._inertia[row - n]
 
-    @property
-    def has_laws(self) -> bool:
-        """Whether effects add torques of their own."""
-        return bool(self._laws)
+    def know_velocities(self, sigma: Array) -> None:
+        """Dry friction becomes its mean over what the velocities may be (statistical linearisation).
+
+        A velocity that is known to less than the width 1/k of the turn rubs one way or the other: with v normal,
+
+            E tanh(k v) = tanh(k v / sqrt(1 + pi/2 (k sigma)^2))   within 0.02,
+
+        and the slope of that is what the uncertainty sees of the friction, not the slope at the mean.
+
+        Args:
+            sigma: of the velocities that friction acts against, shape (n,) [rad/s].
+        """
+        self.sharpness[:] = self._sharpest / np.sqrt(1.0 + 0.5 * np.pi * (self._sharpest * sigma) ** 2)
 
     def command_torque(self, u: Array) -> Array:
         """Torque of the motors for a command in its SI unit, shape (n,) [N m]."""
@@ -104,7 +121,7 @@ class StateRates:
         Returns:
             Shape (d,).
         """
-        tau = self._linear @ x
+        tau = self._constant + self._linear @ x
         tau[self._added] += command_torque - self._coulomb * np.tanh(self.sharpness * x[self.friction_columns])
         for law in self._laws:
             law.add(x, tau, None)
@@ -128,7 +145,7 @@ class StateRates:
             Shapes (d,), (d, d) and (d, n).
         """
         layout, n = self.layout, self._n
-        tau, by_state = self._linear @ x, self._linear.copy()
+        tau, by_state = self._constant + self._linear @ x, self._linear.copy()
         smooth_sign = np.tanh(self.sharpness * x[self.friction_columns])
         tau[self._added] += command_torque - self._coulomb * smooth_sign
         by_state[self._rows, self.friction_columns] -= self._coulomb * self.sharpness * (1.0 - smooth_sign**2)
@@ -188,18 +205,23 @@ def linear_torques(
     return terms.by_state[0]
 
 
-def _laws(robot: Robot, springs: Springs, values: Mapping[str, float]) -> list[LawAtOneState]:
-    """All torque laws among the robot's effects."""
-    laws: list[LawAtOneState] = []
+def _laws(
+    robot: Robot, springs: Springs, values: Mapping[str, float], sharpness: Array
+) -> tuple[list[LawAtOneState], list[LawAtOneState]]:
+    """Torque laws among the robot's effects: those that are linear in the state, and the others."""
     transmission = Transmission.of(robot)
     maps = None if transmission is None else transmission.maps(values)
-    for here in robot.effects:
-        law: LawAtOneState
-        if isinstance(here.effect, JointTorque):
-            law = JointLawAtOneState(here, robot, springs, values)
-        elif isinstance(here.effect, RobotTorque):
-            law = CoupledLawAtOneState(here, robot, springs, values)
-        else:
-            continue
-        laws.append(law if maps is None or not is_behind(here, robot) else LawBehindTransmission(law, *maps))
-    return laws
+    found: tuple[list[LawAtOneState], list[LawAtOneState]] = [], []
+    for part, is_inside in zip(parted(robot, transmission), (True, False), strict=True):
+        joint = [here for here in part if isinstance(here.effect, JointTorque)]
+        straight = [here for here in joint if isinstance(here.effect, JointTorque) and here.effect.bends == "never"]
+        bent = [here for here in joint if here not in straight]
+        both = [side_by_side(own, robot, springs, values, sharpness) for own in (straight, bent)]
+        both[1] += [
+            CoupledLawAtOneState(here, robot, springs, values, sharpness)
+            for here in part
+            if isinstance(here.effect, RobotTorque)
+        ]
+        for laws, own in zip(found, both, strict=True):
+            laws += [LawsBehindTransmission(own, *maps)] if own and is_inside and maps is not None else own
+    return found

@@ -94,6 +94,8 @@ class JointTorque(Effect):
         memory: the effect's own state; None for a law without memory.
         gap: names of the sizes of a dead zone in front of the spring, as `beyond_gap` takes them: other laws of the
             spring feel the deflection beyond it; empty for none.
+        bends: "never" if the law is a sum of numbers and numbers times signals; "smoothly" if its slopes within a short
+            step follow from those at both ends, unless dry friction turns over; else "sharply".
         curve: what it makes of a spring's curve: "terms" that add to others, or "whole" where its stiffness is all
             that may stand beside it; empty for a law that bends no spring.
     """
@@ -103,6 +105,7 @@ class JointTorque(Effect):
     load: str = "transmitted"
     memory: Memory | None = None
     gap: tuple[str, ...] = ()
+    bends: str = "sharply"
     curve: str = ""
 
     def refined(self, coarse: Any, p: Mapping[str, float]) -> dict[str, float]:

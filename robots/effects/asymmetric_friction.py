@@ -22,6 +22,7 @@ EFFECT = JointTorque(
     id="asymmetric_friction",
     side="motor",
     law=law,
+    bends="smoothly",
     parameters=(EffectParameter("torque", "N m", start=0.0, prior_sigma=100.0),),
     example={"torque": 1.0},
     card=Card(

@@ -22,6 +22,7 @@ EFFECT = JointTorque(
     id="friction_by_direction",
     side="motor",
     law=law,
+    bends="smoothly",
     parameters=(
         EffectParameter("torque", "N m", start=0.0, prior_sigma=100.0),
         EffectParameter("coefficient", "N m s/rad", start=0.0, prior_sigma=50.0),

@@ -22,6 +22,7 @@ EFFECT = JointTorque(
     turning=True,
     side="link",
     law=law,
+    bends="smoothly",
     parameters=(
         EffectParameter("cos", "N m", start=0.0, prior_sigma=500.0),
         EffectParameter("sin", "N m", start=0.0, prior_sigma=500.0),

@@ -19,6 +19,7 @@ EFFECT = JointTorque(
     id="link_viscous",
     side="link",
     law=law,
+    bends="never",
     parameters=(EffectParameter("coefficient", "N m s/rad", start=0.1, prior_sigma=50.0, sign="+"),),
     example={"coefficient": 1.0},
     card=Card(

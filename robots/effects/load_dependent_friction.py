@@ -23,6 +23,7 @@ EFFECT = JointTorque(
     id="load_dependent_friction",
     side="motor",
     law=law,
+    bends="smoothly",
     parameters=(EffectParameter("coefficient", "1", start=0.02, prior_sigma=5.0, sign="+"),),
     example={"coefficient": 0.1},
     card=Card(

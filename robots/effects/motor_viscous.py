@@ -19,6 +19,7 @@ EFFECT = JointTorque(
     id="motor_viscous",
     side="motor",
     law=law,
+    bends="never",
     parameters=(EffectParameter("coefficient", "N m s/rad", start=0.5, prior_sigma=50.0, sign="+"),),
     example={"coefficient": 2.0},
     card=Card(

@@ -19,6 +19,7 @@ EFFECT = JointTorque(
     id="parallel_spring",
     side="link",
     law=law,
+    bends="smoothly",
     parameters=(
         EffectParameter("stiffness", "N m/rad", start=0.0, prior_sigma=500.0),
         EffectParameter("torque", "N m", start=0.0, prior_sigma=500.0),

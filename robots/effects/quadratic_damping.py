@@ -21,6 +21,7 @@ EFFECT = JointTorque(
     id="quadratic_damping",
     side="motor",
     law=law,
+    bends="smoothly",
     parameters=(EffectParameter("coefficient", "N m s^2/rad^2", start=0.1, prior_sigma=50.0, sign="+"),),
     example={"coefficient": 1.0},
     card=Card(

@@ -39,6 +39,7 @@ EFFECT = SpringCubic(
     side="spring",
     curve="terms",
     law=law,
+    bends="smoothly",
     parameters=(EffectParameter("stiffness", "N m/rad^3", start=0.0, prior_sigma=1e6),),
     example={"stiffness": 1000.0},
     card=Card(

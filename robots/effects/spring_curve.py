@@ -42,6 +42,7 @@ EFFECT = SpringCurve(
     side="spring",
     curve="terms",
     law=law,
+    bends="smoothly",
     parameters=(
         EffectParameter("quadratic", "N m/rad^2", start=0.0, prior_sigma=3e4),
         EffectParameter("cubic", "N m/rad^3", start=0.0, prior_sigma=1e6),

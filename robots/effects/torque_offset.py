@@ -21,6 +21,7 @@ EFFECT = JointTorque(
     id="torque_offset",
     side="motor",
     law=law,
+    bends="never",
     parameters=(EffectParameter("torque", "N m", start=0.0, prior_sigma=100.0),),
     example={"torque": 1.0},
     card=Card(

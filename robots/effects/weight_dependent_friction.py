@@ -43,6 +43,7 @@ EFFECT = WeightDependentFriction(
     side="motor",
     load="weight",
     law=law,
+    bends="smoothly",
     parameters=(
         EffectParameter("coefficient", "1", start=0.02, prior_sigma=5.0, sign="+"),
         EffectParameter("quadratic", "1/(N m)", start=0.0, prior_sigma=5.0),

@@ -56,6 +56,11 @@ class Adaptation:
             self._build(np.maximum(values, self._floor))
         return far
 
+    def know_velocities(self, sigma: Array) -> None:
+        """Tells the model how well velocities are known that friction acts against; see `StateRates`."""
+        for model in (self.model, *self._variants):
+            model.know_velocities(sigma)
+
     def slopes(self, x: Array, u: Array) -> Array:
         """Derivative of dx/dt by the parameters at a state and a command, shape (d, p)."""
         here = self.model.rates(x, self.model.command_torque(u))

@@ -54,6 +54,8 @@ class ProcessModel:
         self.layout, self._rule = layout, robot.choices.integrator
         self._adaptation = Adaptation(robot, tuple(adapt))
         self._noise = StepNoise(robot)
+        self._random = np.zeros(layout.size)  # density of the random torques in each velocity
+        self._random[robot.layout.velocities] = np.concatenate([robot.noise.link_velocity, robot.noise.motor_velocity])
         walk = [bias_walk] * (3 * len(robot.gyros)) + [ACCELERATION_WALK] * (3 * len(robot.accelerometers))
         walk += list(adapt.values())
         self._walk, self._ones = np.array(walk), np.ones(robot.n)
@@ -83,6 +85,10 @@ class ProcessModel:
         if self._adaptation.follow(x0.mean[layout.adapted], np.sqrt(np.diag(x0.covariance)[layout.adapted])):
             self._near = None
         model = self._adaptation.model
+        rubbing = model.friction_columns
+        self._adaptation.know_velocities(
+            np.sqrt(np.diag(x0.covariance)[rubbing] + 0.5 * h * self._random[rubbing] ** 2)
+        )
         step = take_step(model, self._rule, own, model.command_torque(u), h, self._near)
         T, G = self._noise.of_step(own, h, self._extra(step, doubt))
         F, Q, A0, A1 = (part.copy() for part in self._walked(h))

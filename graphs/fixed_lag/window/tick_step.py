@@ -7,9 +7,9 @@ With f = dx/dt the three rules of the dynamics factors are, for the whole state,
     midpoint  r = x1 - x0 - h f((x0 + x1)/2)
     euler     r = x1 - x0 - h f0
 
-x1 follows from r = 0 by Newton's method, begun with a linearly implicit step; one iteration does unless friction turns
-over within the step. Where dry friction changes its sign within a part of a step, the rules miss its torque over up to
-a sixth of it: a step of the first rule is halved again and again around the change.
+x1 follows from r = 0 by Newton's method, begun with the step that leaves no defect where f is linear; one iteration
+does unless friction turns over within the step. Where dry friction changes its sign within a part of a step, the rules
+miss its torque over up to a sixth of it: a step of the first rule is halved again and again around the change.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ Array = NDArray[np.float64]
 
 ITERATIONS = 4
 SAME_FRICTION = 1e-3  # share of the Coulomb torque that a straight line may miss before rates are evaluated anew
-SAME_DERIVATIVE = 0.01  # largest change of h df/dx over a step whose middle is not evaluated
+SAME_DERIVATIVE = 0.05  # largest change of h df/dx over a step whose middle is not evaluated
 FARTHEST = 1e5  # [rad, rad/s, m, m/s] by which no robot changes within a step; torques that do are no torques
 SMALL_TURN = 0.05  # change of the argument of the friction's tanh in an iteration that needs no further one
 
@@ -45,6 +45,7 @@ class RatesAt:
         f: dx/dt, shape (d,).
         A: its derivative by the state, shape (d, d).
         C: its derivative by the torque of each motor, shape (d, n).
+        sharpness: of dry friction there, shape (n,) [s/rad].
     """
 
     x: Array
@@ -52,23 +53,26 @@ class RatesAt:
     f: Array
     A: Array
     C: Array
+    sharpness: Array
 
     @staticmethod
     def of(model: StateRates, x: Array, torque: Array) -> RatesAt:
         """Evaluated there."""
-        return RatesAt(x, torque, *model.with_jacobian(x, torque))
+        return RatesAt(x, torque, *model.with_jacobian(x, torque), model.sharpness.copy())
 
     def near(self, model: StateRates, x: Array, torque: Array) -> RatesAt:
         """At a state so near that derivatives stay; evaluated anew where friction says that it is not."""
         columns = model.friction_columns
-        speeds = zip(model.sharpness.tolist(), self.x[columns].tolist(), x[columns].tolist(), strict=True)
-        for k, before, after in speeds:
-            was = math.tanh(k * before)
-            straight = (1.0 - was * was) * k * (after - before)
+        k0, k1 = self.sharpness.tolist(), model.sharpness.tolist()
+        for was_k, k, before, after in zip(k0, k1, self.x[columns].tolist(), x[columns].tolist(), strict=True):
+            was = math.tanh(was_k * before)
+            straight = (1.0 - was * was) * was_k * (after - before)
             if abs(math.tanh(k * after) - was - straight) > SAME_FRICTION:
                 return RatesAt.of(model, x, torque)
         moved = x - self.x
-        return RatesAt(x, torque, self.f + self.A @ moved + self.C @ (torque - self.torque), self.A, self.C)
+        return RatesAt(
+            x, torque, self.f + self.A @ moved + self.C @ (torque - self.torque), self.A, self.C, self.sharpness
+        )
 
 
 @dataclass(frozen=True)
@@ -143,7 +147,9 @@ def undivided_step(
         x1 = x0 + h * start.f
         return TickStep(x1, -eye - h * start.A, eye, eye, h * start.C, None) if _near(x0, x1) else _lost(x0, start.C)
     defect = _simpson if rule == "simpson" else _midpoint
-    x1 = x0 + lapack.dgesv(eye - 0.5 * h * start.A, h * start.f)[2]
+    half = 0.5 * h * start.A
+    first = eye - half + half @ half / 3.0 if rule == "simpson" else eye - half
+    x1 = x0 + lapack.dgesv(first, h * start.f)[2]
     for _ in range(ITERATIONS):
         if not _near(x0, x1):
             return _lost(x0, start.C)
@@ -189,8 +195,8 @@ def _simpson(model: StateRates, start: RatesAt, x1: Array, h: float) -> tuple[Ar
 def _is_smooth(model: StateRates, start: RatesAt, end: RatesAt, h: float) -> bool:
     """Whether the derivative in the middle of a step is the mean of those at its ends."""
     columns = model.friction_columns
-    if model.has_laws or not (start.x[columns] * end.x[columns] > 0.0).all():
-        return False  # a law may have a kink, friction turns over
+    if model.has_kinks or not (start.x[columns] * end.x[columns] > 0.0).all():
+        return False  # a spring may have a kink, friction turns over
     return bool(np.abs(end.A - start.A).max() * h < SAME_DERIVATIVE)
 
 

@@ -6,7 +6,7 @@ import pytest
 
 from jointscope.robots.dynamics.carried_weight import CarriedWeight
 from jointscope.robots.dynamics.elastic_joints import ElasticJoints
-from jointscope.robots.dynamics.law_at_one_state import JointLawAtOneState
+from jointscope.robots.dynamics.law_at_one_state import JointLawsAtOneState
 from jointscope.robots.files.effect_editing import add_effect
 from jointscope.robots.files.robot_file import load_robot
 
@@ -71,7 +71,7 @@ def test_one_state_gives_the_same_as_many(loaded):
     values = {name: parameter.value for name, parameter in loaded.parameters.items()}
     model = ElasticJoints(loaded)
     (here,) = loaded.effects
-    law = JointLawAtOneState(here, loaded, model.springs(x, values), values)
+    law = JointLawsAtOneState([here], loaded, model.springs(x, values), values, loaded.friction_sharpness(values))
     tau, by_state = np.zeros(layout.n_rates), np.zeros((layout.n_rates, layout.size))
     law.add(x[0], tau, by_state)
     h = 1e-6

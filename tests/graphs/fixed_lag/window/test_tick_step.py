@@ -181,7 +181,7 @@ def test_noise_is_kept_for_near_postures_only():
 
 @pytest.mark.parametrize("rule", FACTORS)
 def test_a_doubtful_torque_acts_throughout_a_step(rule):
-    """A torque that is off by as much all through a step of length h moves the velocity by v, and the position by h/2 v."""
+    """A torque that is off all through a step of length h by as much moves the position by h/2 times the velocity."""
     robot, x, h = replace(READY, choices=replace(READY.choices, integrator=rule)), np.zeros(12), 1e-6
     noise, model = StepNoise(robot), StateRates(robot)
     extra = np.array([0.0, 0.0, 0.0, 0.05, 0.0, 0.0])  # [rad/s] on the motor of joint 1
