@@ -67,7 +67,9 @@ def _missed(whole: SimpsonDynamics, x: Array, calibration: Calibration) -> Array
     first_v, first_q = first.defects(x0, middle, values)
     second_v, second_q = second.defects(middle, x1, values)
     missed_v = first_v + second_v - d_v
-    missed_q = first_q + second_q + 0.5 * steps.h[:, None] * first_v[:, : d_q.shape[1]] - d_q
+    # a velocity that is off after the first half moves positions through both, one that is off at the end hardly
+    k = d_q.shape[1]
+    missed_q = first_q + second_q + 0.25 * steps.h[:, None] * (first_v - second_v)[:, :k] - d_q
     rows = np.asarray(steps.combine(missed_v, missed_q) / steps.sigmas)
     if steps.free is not None:
         k = steps.free.shape[1]

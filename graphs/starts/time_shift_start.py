@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Start values of delays and clock offsets: the ones at which the states fit best.
+"""Start values of delays, clock offsets and places of trackers: the ones at which the states fit best.
 
 A sample stands between two states near the instant at which the present delay puts it. From a delay that is off by
-several samples the iterations run into a valley of bent states and never come out of it.
+several samples the iterations run into a valley of bent states and never come out of it. A tracker that stands
+decimetres from where the file says bends them even more than a delay does, so it is placed first, and once more after.
 """
 
 from __future__ import annotations
@@ -17,6 +18,7 @@ from jointscope.factors.calibration import DYNAMICS
 from jointscope.graphs.problem.bag_problem import BagProblem
 from jointscope.graphs.solving.batch_solver import solve
 from jointscope.graphs.solving.estimate import Estimate
+from jointscope.graphs.solving.normal_equations import chunks, states_of
 from jointscope.robots.effect_kinds.time_shift import TimeShift
 from jointscope.robots.errors import SolveError
 from jointscope.robots.model.robot import Robot
@@ -28,6 +30,7 @@ OF_TARGETS = np.array([30.0, 40.0, 50.0, 60.0, 75.0, 90.0, 110.0, 130.0, 150.0])
 ITERATIONS = 3
 REFINED = 5  # parabolas through the lowest values at the most
 NEAR = 2e-4  # [s]
+PLACED = 6  # Gauss-Newton steps that place a tracker
 
 
 def with_best_shifts(
@@ -40,12 +43,49 @@ def with_best_shifts(
         start: where to begin.
         hold: further blocks that stay.
     """
-    best, estimate = list(problems), start
-    for name in () if DYNAMICS in hold else _shifts(problems[0].robot):
+    held = DYNAMICS in hold
+    best, estimate = list(problems), start if held else with_placed_trackers(problems, start)
+    for name in () if held else _shifts(problems[0].robot):
         scan = _Scan(best, estimate, name, (DYNAMICS, *hold))
         value = scan.lowest()
         best, estimate = placed(best, {name: value}), _with_value(estimate, name, value)
+        estimate = with_placed_trackers(best, estimate)
     return best, estimate
+
+
+def with_placed_trackers(problems: Sequence[BagProblem], estimate: Estimate) -> Estimate:
+    """The estimate with position targets and their trackers where the states see them, as far as they are free.
+
+    States stay. Their springs are not yet right and bend them by millimetres; nobody knows a tracker that well.
+
+    Args:
+        problems: factors of each recording, or of windows of them.
+        estimate: states and values.
+    """
+    robot, calibration = problems[0].robot, estimate.calibrations[0]
+    targets, names = {target.name for target in robot.targets}, calibration.names
+    shifts = _shifts(robot)
+    there = [name.split(".", 1)[0] in targets and name not in shifts for name in names]
+    own = [i for i, its in enumerate(there) if its and not calibration.positive[i]]
+    if not own:
+        return estimate
+    prior = np.array([robot.parameters[names[i]].prior_sigma for i in own])
+    mean = np.array([robot.parameters[names[i]].value for i in own])
+    for _ in range(PLACED):
+        H, g = np.diag(prior**-2.0), (mean - calibration.dynamics[own]) / prior**2
+        for problem, x, bag in zip(problems, estimate.states, estimate.calibrations, strict=True):
+            here = bag.with_points({DYNAMICS: calibration.dynamics})
+            for factor, ticks in (piece for part in problem.placed for piece in chunks(part)):
+                if factor.name in targets:
+                    linear = factor.linearize(states_of(factor, ticks, x), here)
+                    sigmas = np.broadcast_to(factor.sigmas, linear.residual.shape)
+                    J = (linear.by_block[DYNAMICS][:, :, own] / sigmas[:, :, None]).reshape(-1, len(own))
+                    H, g = H + J.T @ J, g - J.T @ (linear.residual / sigmas).reshape(-1)
+        dynamics = calibration.dynamics.copy()
+        dynamics[own] += np.linalg.solve(H, g)
+        calibration = calibration.with_points({DYNAMICS: dynamics})
+    bags = tuple(bag.with_points({DYNAMICS: calibration.dynamics}) for bag in estimate.calibrations)
+    return Estimate(estimate.states, bags)
 
 
 @dataclass

@@ -104,12 +104,12 @@ def test_springs_are_known_much_better_with_it(result, robot, made):
     assert all(shares[f"joint{k}.stiffness"] < 0.7 for k in (1, 2, 3)), shares  # 0.62, 0.56, 0.43
 
 
-@pytest.mark.parametrize("shift", [0.04, -0.03])
+@pytest.mark.parametrize("shift", [0.02, 0.04, 0.05, -0.03])
 def test_the_delay_of_a_camera_is_told_and_found(robot, made, shift):
     stream = made.recording.streams["marker3"]
     late = replace(stream, times=stream.times + shift, received=None)
     recording = replace(made.recording, streams={**made.recording.streams, "marker3": late})
-    if shift > 0.0:  # springs so soft look like 20 ms themselves, which hide as much of a clock that is ahead
+    if shift > 0.03:  # springs so soft look like 20 ms themselves, which hide as much of a clock that is ahead
         (told,) = (n.text for n in screen(recording, robot) if n.kind == "timing")
         about = float(told.split("marker3 is late, by about ")[1].split(" ms, some of which may be due to springs")[0])
         assert about == pytest.approx(40.0, abs=25.0)

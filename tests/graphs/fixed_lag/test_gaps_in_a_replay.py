@@ -16,6 +16,7 @@ pytestmark = pytest.mark.slow
 
 
 # where a joint stands within the play a tick or two may be far: of 3 s these alone would be more than a hundredth
+BEGIN = 0.6  # [s] by when the robot moves
 FAULTS = [("backlash@joint1:half_gap=0.01", 3.0), ("encoder_hysteresis@joint2:half_play=4e-4", 6.0)]
 
 
@@ -28,5 +29,6 @@ def test_states_at_the_lag_agree_with_the_batch_from_a_rest_within_the_gap(fault
     )
     robot = js.calibrate(add_effect(doggy, fault.split(":")[0]), train).robot
     lagged = replay(robot, moves, 0.1).lagged
-    found = batch_agreement(robot, moves, lagged.times, lagged.mean, lagged.sigma)
+    moving = lagged.times > BEGIN
+    found = batch_agreement(robot, moves, lagged.times[moving], lagged.mean[moving], lagged.sigma[moving])
     assert found.apart == {} and found.agrees
