@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Where a link that swings on comes to rest: the middle of its swing, which a coarse encoder tells better than a rest.
 
-    q(t) = q0 + sum_k [exp(-d_k t) (a_k cos w_k t + b_k sin w_k t) + c exp(-2 d_k t) (a_k^2 + b_k^2)],   t = 0 at the end
+    q(t) = q0 + sum_k [exp(-d_k t) (a_k cos w_k t + b_k sin w_k t) + c exp(-2 d_k t) (a_k^2 + b_k^2)],  t = 0 at the end
 
 A plain mean over some part of a swing is off by the part of a period that is left over. Rounding of an encoder is one
 error as long as its reading stays the same, however many samples there are: they count as one together. A link that
@@ -22,7 +22,9 @@ from scipy.optimize import least_squares
 Array = NDArray[np.float64]
 MOST_MODES = 2
 FIRST, OF_MODE = 2, 4  # values: q0 and c; two amplitudes, frequency and decay
-CURVED = 2.0  # [1/rad] sigma of c, which is K2 / (2 K) for a spring of K d + K2 d^2
+# [1/rad] sigma of c, which is K2 / (2 K) for a spring of K d + K2 d^2. All rests of a spring share its c: a sigma as
+# small as c itself pulls all of their middles the same way, and the spring is off by more than its own sigma says
+CURVED = 5.0
 LOWEST, FINEST = 0.5, 0.2  # periods in the stretch, of the slowest swing that is tried, and from one to the next
 PER_PERIOD = 4.0  # errors of their own that a period must have
 DECAYS = (0.0, 0.05, 0.2)  # of the frequency w, where a swing is looked for
