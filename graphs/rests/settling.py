@@ -20,9 +20,6 @@ from jointscope.graphs.solving.set_problem import SetProblem
 
 Array = NDArray[np.float64]
 PASSES = 6  # of the repeatability
-BLUNT = (
-    40  # iterations at the most where edges are blunt: these stages only lead to the others, friction may drift there
-)
 AGREES = 0.05  # relative change of it that asks for no further pass
 
 
@@ -54,7 +51,7 @@ def settled(
     Args:
         rests: with the model and the weights to begin with.
         estimate: where to begin: the rests, then those beside.
-        most_iterations: of each stage whose edges are sharp.
+        most_iterations: of each stage.
         edges: blur of the bands' edges, stage by stage.
         each: called with the number of each stage, its rests and its solution; may raise to end the search.
         beside: recordings of other kinds in the same graph.
@@ -65,8 +62,7 @@ def settled(
     iterations, stages = 0, (*edges, *[EDGE] * PASSES)
     for k, edge in enumerate(stages):
         rests = replace(rests, edge=edge)
-        most = most_iterations if edge == EDGE else min(BLUNT, most_iterations)
-        solution = solve([rests, *beside], estimate, max_iterations=most)
+        solution = solve([rests, *beside], estimate, max_iterations=most_iterations)
         estimate, iterations = solution.estimate, iterations + len(solution.iterations)
         if each is not None:
             each(k, rests, solution)
