@@ -101,7 +101,7 @@ def _rests_at(like: Rests, q: Array, forces: Array, links: tuple[str, ...]) -> R
     return replace(
         like, times=np.zeros((c, 2)), q_motor=q.copy(), q_link=None if like.q_link is None else q.copy(),
         u=np.zeros_like(q), motor_scatter=motor, link_scatter=link, u_scatter=u, forces=forces, links=links,
-        moved=np.ones(q.shape, dtype=bool), creep=np.zeros_like(q),
+        moved=np.ones(q.shape, dtype=bool), creep=np.zeros_like(q), rounding=None,
     )  # fmt: skip
 
 

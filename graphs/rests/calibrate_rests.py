@@ -247,7 +247,7 @@ def _settled(
 
     def converged(k: int, rests: RestSet, solution: Solution) -> None:
         report(f"rests, pass {k + 1}, cost {solution.cost:.6g}", min((k + 1) / 6.0, 0.95))
-        if not (solution.converged or solution.flat):
+        if rests.edge == EDGE and not (solution.converged or solution.flat):  # blunt edges only lead there
             raise SolveError(
                 f"no convergence after {len(solution.iterations)} iterations over "
                 f"{len(rests.rests)} rests; loads, units, signs or names may be wrong: "

@@ -163,7 +163,8 @@ class RestSet:
         motor = np.hypot(robot.motor_encoder.sigmas, rests.motor_scatter)
         if robot.link_encoder is None:
             return motor, np.full_like(motor, np.inf)
-        return motor, self.repeatability * np.hypot(robot.link_encoder.sigmas, rests.link_scatter)
+        link = np.hypot(rests.rounded * robot.link_encoder.sigmas, rests.link_scatter)
+        return motor, self.repeatability * link
 
     def residuals(self, x: Array, values: Mapping[str, float] | None = None) -> Array:
         """Links measured less where they are in equilibrium, in sigmas, shape (m, n); zero without encoders.

@@ -2,7 +2,8 @@
 """Rests of a robot: stretches in which motors, links and load stand, each with its means and how far they may be off.
 
 A motor stands where its encoder stays within its noise, or creeps (creep.py). Links swing on for seconds, so the end
-of a stretch counts, and what parts of it differ by says how well its mean is known.
+of a stretch counts, and what parts of it differ by says how well its mean is known. Where the whole stretch shows a
+swing whose middle is known better (swing.py), the middle counts.
 """
 
 from __future__ import annotations
@@ -18,10 +19,12 @@ from jointscope.robots.dynamics.transmission import joint_angles
 from jointscope.robots.errors import RecordingError
 from jointscope.robots.model.command_words import edited_argument, robot_argument
 from jointscope.robots.model.robot import Robot
+from jointscope.robots.parts.sensors import Encoder
 from jointscope.robots.recordings.recording import Notice, Recording
 from jointscope.robots.recordings.still_stretches import OFTEN, SHORTEST, WITHIN, share_of, standing
 from jointscope.robots.rests.creep import EVEN, PARTS, creep_of, creeping_stretches
 from jointscope.robots.rests.load_history import LoadHistory
+from jointscope.robots.rests.swing import middle_of_swing
 
 Array = NDArray[np.float64]
 SHARES = (1.0, 0.7, 0.5, 0.35, 0.25)  # of its end that may be looked at; that counts whose parts agree best
@@ -39,13 +42,15 @@ class Rests:
         path, sha256: of the bag.
         times: begin and end of what is looked at, shape (m, 2) [s].
         q_motor: mean readings of the motor encoders, shape (m, n) [rad].
-        q_link: of the link encoders, shape (m, n) [rad]; None without.
+        q_link: of the link encoders, or the middles of swings, shape (m, n) [rad]; None without.
         u: mean command in its SI unit, shape (m, n).
         motor_scatter, link_scatter, u_scatter: by how much parts of each rest differ, shape (m, n).
         forces, links: known load of each rest, shape (m, 3) [N], and the link that it acts on.
         moved: whether each motor has moved since the last rest, and its friction tells something, shape (m, n).
         creep: velocity of motors that slide on slowly, shape (m, n) [rad/s]; 0 where they stand.
         notices: what was left out.
+        rounding: what a swing across the steps of a link encoder leaves of its sigma, shape (m, n); 1 where it stands,
+            None where all do.
     """
 
     path: str
@@ -62,6 +67,7 @@ class Rests:
     moved: NDArray[np.bool_]
     creep: Array
     notices: tuple[Notice, ...] = ()
+    rounding: Array | None = None
 
     def __len__(self) -> int:
         return len(self.q_motor)
@@ -70,7 +76,13 @@ class Rests:
         """Some of the rests."""
         some = {name: getattr(self, name)[kept] for name in ARRAYS}
         links = tuple(link for link, keep in zip(self.links, kept.tolist(), strict=True) if keep)
-        return replace(self, q_link=None if self.q_link is None else self.q_link[kept], links=links, **some)
+        q_link, rounding = (None if part is None else part[kept] for part in (self.q_link, self.rounding))
+        return replace(self, q_link=q_link, rounding=rounding, links=links, **some)
+
+    @property
+    def rounded(self) -> Array:
+        """`rounding` of all rests, shape (m, n)."""
+        return np.ones_like(self.q_motor) if self.rounding is None else self.rounding
 
 
 def joined_rests(recordings: Sequence[Rests]) -> Rests:
@@ -81,6 +93,7 @@ def joined_rests(recordings: Sequence[Rests]) -> Rests:
     seen = [rests.q_link for rests in recordings if rests.q_link is not None]
     links, notices = (sum((getattr(rests, name) for rests in recordings), ()) for name in ("links", "notices"))
     paths = ", ".join(rests.path for rests in recordings)
+    together["rounding"] = np.concatenate([rests.rounded for rests in recordings])
     return Rests(paths, "", q_link=np.concatenate(seen) if seen else None, links=links, notices=notices, **together)
 
 
@@ -98,6 +111,7 @@ def find_rests(recording: Recording, robot: Robot, loads: LoadHistory) -> Rests:
     motor, link = robot.motor_encoder, robot.link_encoder
     stream, still = recording.streams[motor.name], standing(recording, robot)
     stretches = _split(sorted([*still, *creeping_stretches(recording, robot, still)]), loads.changes)
+    stands = set(_split(still, loads.changes))
     found, swinging, drifts = [], 0, []
     for t0, t1 in stretches:
         a = _most_settled(recording, motor.name if link is None else link.name, t0, t1)
@@ -108,9 +122,15 @@ def find_rests(recording: Recording, robot: Robot, loads: LoadHistory) -> Rests:
         if link is not None and np.any(link_scatter > SWINGING * link.sigmas):
             swinging += 1
             continue
+        rounding = np.ones_like(q_link)
+        if link is not None and (t0, t1) in stands:
+            q_link, link_scatter, rounding = _swung(recording, link, (t0, t1), q_link, link_scatter)
         zero = 0.0 if link is None else link.zero
         creep, known = creep_of(stream, motor.sigmas, a, t1)
-        positions, scatters = (q_motor - motor.zero, q_link - zero, u), (motor_scatter, link_scatter, u_scatter)
+        positions, scatters = (
+            (q_motor - motor.zero, q_link - zero, u),
+            (motor_scatter, link_scatter, u_scatter, rounding),
+        )
         found.append((known, creep, np.array([a, t1]), *positions, *scatters))
     if not found:
         raise RecordingError(_why_none(recording, still, stretches, swinging))
@@ -121,7 +141,7 @@ def find_rests(recording: Recording, robot: Robot, loads: LoadHistory) -> Rests:
             f"motion stands before the first option: jointscope calibrate {robot_argument(robot)} {recording.path} "
             f"-o {edited_argument(robot, 'calibrated')}"
         )
-    known, creep, times, q_motor, q_link, u, motor_scatter, link_scatter, u_scatter = map(
+    known, creep, times, q_motor, q_link, u, motor_scatter, link_scatter, u_scatter, rounding = map(
         np.array, zip(*found, strict=True)
     )
     hung = [loads.at(float(t[1]) - 1e-9) for t in times]
@@ -131,7 +151,7 @@ def find_rests(recording: Recording, robot: Robot, loads: LoadHistory) -> Rests:
     notices = _notices(len(found), swinging, np.array(drifts))
     rests = Rests(
         recording.path, recording.sha256, times, q_motor, None if link is None else q_link, u,
-        motor_scatter, link_scatter, u_scatter, forces, links, moved, creep, notices,
+        motor_scatter, link_scatter, u_scatter, forces, links, moved, creep, notices, rounding,
     )  # fmt: skip
     last = _last_of_each(rests)
     rests = rests.only(last)
@@ -163,6 +183,29 @@ def _mean(recording: Recording, name: str, t0: float, t1: float) -> tuple[Array,
         return stream.values[k], np.zeros(stream.values.shape[1])
     parts = np.array([part.mean(axis=0) for part in np.array_split(inside, PARTS)])
     return inside.mean(axis=0), parts.std(axis=0)
+
+
+def _swung(
+    recording: Recording, link: Encoder, stretch: tuple[float, float], q: Array, scatter: Array
+) -> tuple[Array, Array, Array]:
+    """Means and scatters, where a swing's middle is known better with this, and what is left of the encoder's sigma.
+
+    Args:
+        recording: of the robot.
+        link: encoders of the links.
+        stretch: in which motors and load stand [s].
+        q: means, shape (n,) [rad].
+        scatter: by how much parts differ, shape (n,) [rad].
+    """
+    stream = recording.streams[link.name]
+    inside = (stream.times >= stretch[0]) & (stream.times < stretch[1])
+    q, scatter, rounding = q.copy(), scatter.copy(), np.ones_like(q)
+    for j, sigma in enumerate(link.sigmas.tolist()):
+        found = middle_of_swing(stream.times[inside], stream.values[inside, j], sigma)
+        if found is not None and found.sigma < np.hypot(sigma, scatter[j]):
+            rounding[j] = min(found.sigma / sigma, 1.0)
+            q[j], scatter[j] = found.value, np.sqrt(max(found.sigma**2 - sigma**2, 0.0))
+    return q, scatter, rounding
 
 
 def _moved(first: Array, q_motor: Array, within: Array) -> NDArray[np.bool_]:
