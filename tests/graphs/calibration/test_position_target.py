@@ -112,7 +112,7 @@ def test_the_delay_of_a_camera_is_told_and_found(robot, made, shift):
     if shift > 0.03:  # springs so soft look like 20 ms themselves, which hide as much of a clock that is ahead
         (told,) = (n.text for n in screen(recording, robot) if n.kind == "timing")
         about = float(told.split("marker3 is late, by about ")[1].split(" ms, some of which may be due to springs")[0])
-        assert about == pytest.approx(40.0, abs=25.0)
+        assert about == pytest.approx(1e3 * shift, abs=25.0)
         assert "encoder_delay@marker3" in told and not [n for n in screen(made.recording, robot) if n.kind == "timing"]
     knowing = add_effect(robot, "encoder_delay@marker3")
     assert not [n for n in screen(recording, knowing) if n.kind == "timing"]
