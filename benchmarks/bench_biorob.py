@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Prints what was promised of the BioRob beside what is measured, on recordings that another program simulated.
 
-Usage: python benchmarks/bench_biorob.py [rests | together | arms | faults | clean | currents | lag | nothing
-| deadzone | idler | hall ...]; the recordings lie in ../shared/data/biorob, those of `arms` and `faults` are simulated.
+Usage: python benchmarks/bench_biorob.py [rests | together | arms | faults | clean | currents | lag | hebi
+| nothing | deadzone | idler | hall ...]; the recordings lie in ../shared/data, those of `arms` and `faults` are
+simulated.
 """
 
 from __future__ import annotations
@@ -17,6 +18,7 @@ import numpy as np
 from biorob_arms import coverage
 from biorob_currents import currents
 from biorob_faults import faults
+from biorob_hebi import hebi
 from biorob_lag import lag
 from biorob_rests import rests_alone, together, true_drives
 from section_runs import run_sections
@@ -38,7 +40,7 @@ FAULTS = {  # folder: what its README says is wrong, as candidates are labelled
     "hall": "encoder_eccentricity@joint3.link",
 }
 IDLER = ", over: {joint3: 0.0120}"  # what a description without the idler lacks
-SECTIONS = ("rests", "together", "arms", "faults", "clean", "currents", "lag", "nothing", *FAULTS)
+SECTIONS = ("rests", "together", "arms", "faults", "clean", "currents", "lag", "hebi", "nothing", *FAULTS)
 
 
 def main() -> None:
@@ -58,6 +60,8 @@ def _section(name: str) -> Section:
         return coverage()
     if name == "faults":
         return faults()
+    if name == "hebi":
+        return hebi(DATA.parent / "real")
     if name in ("currents", "lag"):
         return (currents if name == "currents" else lag)(DATA)
     robot = load_robot("biorob")

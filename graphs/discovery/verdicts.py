@@ -20,6 +20,8 @@ from jointscope.graphs.refits.left_out import Missed
 from jointscope.graphs.refits.validated_refit import ValidatedRefit
 from jointscope.graphs.refits.validation import ValidationError, reported_heldout_error
 from jointscope.robots.effect_kinds.effect import Effect, EffectParameter
+from jointscope.robots.effect_kinds.joint_torque import JointTorque
+from jointscope.robots.files.effect_catalogue import catalogue
 from jointscope.robots.model.robot import Robot
 from jointscope.robots.recordings.recording import Recording
 
@@ -225,7 +227,11 @@ def standing_in(candidate: Candidate, slowest: Mapping[str, float]) -> Candidate
 
 
 def ranked(candidates: Sequence[Candidate]) -> list[Candidate]:
-    """Missing ones first, by validation error; where that is the same, by what they cost and by score."""
+    """Missing ones first, by validation error; where that is the same, by what they cost and by score.
+
+    Laws that do the same, as viscous friction of motor and link do at a rigid joint, have the same score but for
+    rounding: then the drive's comes first.
+    """
     order = {"missing": 0, "stand_in": 1, "possible": 2, "absent": 3, "untestable": 4}
     missing = [c for c in candidates if c.verdict == "missing"]
     best = min(missing, key=lambda c: c.validation_error, default=None)
@@ -234,9 +240,12 @@ def ranked(candidates: Sequence[Candidate]) -> list[Candidate]:
         candidates = [c if c.validation_error <= smallest else yielding(c, best) for c in candidates]
 
     def key(c: Candidate) -> tuple[float, ...]:
+        effect = catalogue().get(c.effect)
+        of_link = float(isinstance(effect, JointTorque) and effect.side == "link")
+        score = float(f"{c.score:.6g}")
         if c.verdict == "missing":
-            return (0.0, float(c.dof), -c.score)
-        return (float(order[c.verdict]), -c.score, 0.0)
+            return (0.0, float(c.dof), -score, of_link)
+        return (float(order[c.verdict]), -score, of_link)
 
     return sorted(candidates, key=key)
 
