@@ -30,9 +30,11 @@ from jointscope.graphs.discovery.verdicts import MATTERS, SAME, SURE
 from jointscope.graphs.solving.batch_solver import Progress
 from jointscope.graphs.solving.solver_context import in_solver_context
 from jointscope.robots.errors import JointscopeError, RecordingError
+from jointscope.robots.geometry.arm_effects import POSES
 from jointscope.robots.model.robot import Robot
 
 MOST_STEPS = 8
+NOISE = {MOTION: 1.0, POSES: 1.0}  # [sigma] error that noise alone leaves; of other kinds errors are shares
 NOTHING_LEFT = "no kind of recordings shows an effect that the others do not speak against"
 
 
@@ -172,7 +174,9 @@ class _Search:
         told = [kind for kind in candidate.seen_by if not _by_friction(kind, self.given)]
         was = self._errors(trial.beside, told)
         now = errors_by_kind(trial.model, self.given, last.model, told)
-        worse = [kind for kind in told if now[kind] ** 2 > (1.0 + SAME) ** 2 * was[kind] ** 2]
+        # what is within its noise is as good as it was: the values of other kinds move it by chance
+        most = {kind: max((1.0 + SAME) * was[kind], NOISE.get(kind, 0.0)) for kind in told}
+        worse = [kind for kind in told if now[kind] > most[kind]]
         if worse:
             kind = worse[0]
             return f"raises the error in {kind} from {was[kind]:.3g} to {now[kind]:.3g}"
