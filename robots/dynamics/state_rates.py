@@ -98,7 +98,7 @@ class StateRates:
 
         A velocity that is known to less than the width 1/k of the turn rubs one way or the other: with v normal,
 
-            E tanh(k v) = tanh(k v / sqrt(1 + pi/2 (k sigma)^2))   within 0.02,
+            E tanh(k v) = tanh(k v / sqrt(1 + pi/2 (k sigma)^2))   within 0.04,
 
         and the slope of that is what the uncertainty sees of the friction, not the slope at the mean.
 

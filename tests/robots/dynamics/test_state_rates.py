@@ -9,6 +9,11 @@ from robots_to_compare import READY, ROBOTS, states
 
 from jointscope.robots.dynamics.elastic_joints import ElasticJoints
 from jointscope.robots.dynamics.state_rates import StateRates
+from jointscope.robots.effect_kinds.joint_torque import JointTorque
+from jointscope.robots.errors import EffectError
+from jointscope.robots.files.effect_catalogue import catalogue
+from jointscope.robots.files.effect_editing import add_effect
+from jointscope.robots.files.robot_file import load_robot
 
 COUNT = 12
 
@@ -97,3 +102,31 @@ def test_other_values_are_used_instead_of_the_robots_own():
     u = np.array([0.2, -0.3, 0.4])
     np.testing.assert_array_equal(given.command_torque(u), own.command_torque(u))
     np.testing.assert_array_equal(given.rates(x, given.command_torque(u)), own.rates(x, own.command_torque(u)))
+
+
+LAWS = [e for e in catalogue().values() if isinstance(e, JointTorque)]
+PLACES = {"doggy": ("joint1", "joint3"), "biorob": ("joint2", "joint4")}
+
+
+@pytest.mark.parametrize("effect", LAWS, ids=lambda effect: effect.id)
+@pytest.mark.parametrize("name", PLACES)
+def test_a_law_at_two_joints_is_evaluated_side_by_side_as_if_alone(name, effect):
+    robot, rng = load_robot(name), np.random.default_rng(8)
+    for joint in PLACES[name]:
+        if effect.id not in {here.effect.id for here in robot.effects if here.owner == joint}:
+            try:
+                robot = add_effect(robot, f"{effect.id}@{joint}")
+            except EffectError as err:
+                pytest.skip(str(err))
+    own = [n for n, p in robot.parameters.items() if p.effect and n.split(".")[1] == effect.id]
+    sized = {n: effect.example.get(n.split(".")[2], 0.1) * rng.uniform(0.5, 1.5) for n in own}
+    robot = robot.with_values({n: v for n, v in sized.items() if not n.endswith("order")})
+    joints, model, x = ElasticJoints(robot), StateRates(robot), states(robot, COUNT)
+    u = rng.uniform(-1.0, 1.0, (COUNT, robot.n))
+    expected = joints.with_derivatives(x, u, np.array([robot.parameters[n].value for n in joints.names]))
+    for k in range(COUNT):
+        rate, A, _ = model.with_jacobian(x[k], model.command_torque(u[k]))
+        most = np.abs(expected.value[k]).max()
+        np.testing.assert_allclose(rate[robot.layout.rates], expected.value[k], rtol=1e-10, atol=1e-9 + 1e-14 * most)
+        scale = np.abs(expected.by_state[k]).max()
+        np.testing.assert_allclose(A[robot.layout.rates], expected.by_state[k], rtol=1e-9, atol=1e-11 * scale)
