@@ -8,6 +8,8 @@ from pathlib import Path
 
 import numpy as np
 from estimator_case import Case
+from estimator_consistency import BOUNDS, within
+from estimator_latency import BEGIN
 from estimator_run import LAG, driven, run
 from message_feed import in_order
 from patience import say
@@ -22,8 +24,6 @@ from jointscope.tools.bags.read_recording import read_recording
 from jointscope.tools.simulator import Disturbance, Simulation, simulate
 
 TAIL = 0.5  # [ms]
-BOUNDS = (0.8, 1.25)  # per degree of freedom
-BEGIN = 200  # updates that do not count
 SEEDS = range(1, 11)
 TRAINING, SECONDS = 12.0, 6.0  # [s]
 TORQUE = {"link": 0.05, "motor": 0.05}  # [N m] on links and pulleys, new each millisecond
@@ -74,7 +74,7 @@ def _judge(section: Section) -> None:
     nees, lagged, nis = np.mean(found, axis=0)
     for name, value in (("NEES now", nees), (f"NEES {LAG:g} s later", lagged), ("NIS", nis)):
         wanted = f"{BOUNDS[0]:g} to {BOUNDS[1]:g}"
-        section.promise(f"mean {name}", wanted, f"{value:.3f}", bool(BOUNDS[0] <= value <= BOUNDS[1]))
+        section.promise(f"mean {name}", wanted, f"{value:.3f}", within(float(value)))
     section.tables.append(Table("Recordings", ("seed", "NEES now", f"NEES {LAG:g} s later", "NIS"), rows))
     section.numbers["normalised"] = found
 

@@ -36,6 +36,8 @@ class DynamicsFactor(ABC):
     name = "dynamics"
     states = 2
     blocks = (DYNAMICS,)
+    behind = 0.0
+    """Part of h/2 d_v by which positions lag behind a torque that acts throughout; 1 where they take no later speed."""
 
     def __len__(self) -> int:
         return len(self.steps)
@@ -61,11 +63,15 @@ class DynamicsFactor(ABC):
     def residual(self, x: tuple[Array, ...], calibration: Calibration) -> Array:
         """Defects of velocities and positions over each step, shape (m, d)."""
         d_v, d_q = self.defects(x[0], x[1], calibration.values)
-        found, plays = self.steps.combine(d_v, d_q), self.model.plays
+        found, plays = self.combined(d_v, d_q), self.model.plays
         if plays is not None:
             h = plays.sizes(self.model.named(calibration.values))
             found[:, plays.rows] = x[1][:, plays.lags] - plays.after(x[0], x[1], h)
         return found
+
+    def combined(self, d_v: Array, d_q: Array) -> Array:
+        """Rows whose noise is independent, of this rule; see `Steps.combine`."""
+        return self.steps.combine(d_v, d_q, self.behind)
 
     def linearize(self, x: tuple[Array, ...], calibration: Calibration) -> Linearization:
         """Defects and derivatives."""
@@ -125,10 +131,10 @@ class DynamicsFactor(ABC):
             middle: accelerations within the step; they tell how a change of the command acts.
         """
         self._add_commands(by_parameter, calibration, middle)
-        dynamics = self.steps.combine(*by_parameter) * calibration.value_by_coordinate
+        dynamics = self.combined(*by_parameter) * calibration.value_by_coordinate
         return Linearization(
-            self.steps.combine(*defects),
-            (self.steps.combine(*by_x0), self.steps.combine(*by_x1)),
+            self.combined(*defects),
+            (self.combined(*by_x0), self.combined(*by_x1)),
             {DYNAMICS: dynamics},
         )
 

@@ -20,6 +20,8 @@ Array = NDArray[np.float64]
 class EulerDynamics(DynamicsFactor):
     """d_v = v1 - v0 - h a(x0, u), d_q = q1 - q0 - h v0."""
 
+    behind = 1.0
+
     def defects(self, x0: Array, x1: Array, parameters: Array) -> tuple[Array, Array]:
         """Defects of velocities with memories, shape (m, r), and of positions, shape (m, k)."""
         return self._defects(

@@ -46,7 +46,6 @@ class Steps:
         sliding: how sharply the dry friction of each joint turns over at the beginning and the end of each step, as a
             part of what its law says, shape (m, 2, n); None where all is as it says.
         rise: by how much u rises over each step, shape (m, n), where no path says it; None where it is constant.
-        behind: part of h/2 d_v by which positions of the rule lag behind a torque that acts throughout; see `behind`.
     """
 
     h: Array
@@ -59,7 +58,6 @@ class Steps:
     free: Array | None = None
     sliding: Array | None = None
     rise: Array | None = None
-    behind: float = 0.0
 
     def __len__(self) -> int:
         return len(self.h)
@@ -141,10 +139,11 @@ class Steps:
             positions = np.maximum(positions, self.free * root * h)
         return np.hstack([rates, positions])
 
-    def combine(self, d_v: Array, d_q: Array) -> Array:
+    def combine(self, d_v: Array, d_q: Array, behind: float = 0.0) -> Array:
         """Stacks rate and position defects (axis 1) into the rows whose noise is independent.
 
         Where W is given, link rows become impulses on the mean inertia.
+        `behind` is that of the rule; see `DynamicsFactor`.
         """
         if not self.integrated:
             return np.concatenate([d_v, d_q], axis=1)
@@ -154,13 +153,8 @@ class Steps:
         weight = np.zeros((len(d_v), 0, 0)) if self.weight is None else self.weight
         found = np.empty((*shape[:2], d_v[:1, 0].size))
         parts = (np.ascontiguousarray(d.reshape(*d.shape[:2], -1)) for d in (d_v, d_q))
-        combine(np.ascontiguousarray(weight), 0.5 * self.behind * self.h, *parts, found)
+        combine(np.ascontiguousarray(weight), 0.5 * behind * self.h, *parts, found)
         return found.reshape(shape)
-
-
-def behind(rule: str) -> float:
-    """1 for a rule whose positions follow the velocity at the beginning of a step, 0 for one that takes both ends."""
-    return 1.0 if rule == "euler" else 0.0
 
 
 def rate_sigmas(noise: ProcessNoise, h: Array) -> Array:

@@ -239,9 +239,10 @@ def ranked(candidates: Sequence[Candidate]) -> list[Candidate]:
         smallest = best.validation_error * (1.0 + SAME)
         candidates = [c if c.validation_error <= smallest else yielding(c, best) for c in candidates]
 
+    links = {e.id for e in catalogue().values() if isinstance(e, JointTorque) and e.side == "link"}
+
     def key(c: Candidate) -> tuple[float, ...]:
-        effect = catalogue().get(c.effect)
-        of_link = float(isinstance(effect, JointTorque) and effect.side == "link")
+        of_link = float(c.effect in links)
         score = float(f"{c.score:.6g}")
         if c.verdict == "missing":
             return (0.0, float(c.dof), -score, of_link)

@@ -24,7 +24,7 @@ from jointscope.factors.interpolated import interpolate
 from jointscope.factors.midpoint_dynamics import MidpointDynamics
 from jointscope.factors.priors import BiasPrior
 from jointscope.factors.simpson_dynamics import SimpsonDynamics
-from jointscope.factors.step import Steps, behind
+from jointscope.factors.step import Steps
 from jointscope.graphs.problem.dead_zone_edges import DeadZoneEdges
 from jointscope.graphs.problem.sensor_placement import Placed, place_sensor
 from jointscope.graphs.problem.standstill import Stretches, holding_motors, stiffness
@@ -96,9 +96,8 @@ class BagProblem:
         whole = timeline.h if between is None else Timeline.of(recording, robot.command_held).h
         holds = holding_motors(robot, recording, whole)
         free, slides = _free(robot, recording, timeline, holds), _sliding(robot, timeline, holds, whole)
-        rule = robot.choices.integrator
         steps = Steps(timeline.h, timeline.u, robot.noise, robot.layout, weights, acting, index, free, slides)
-        dynamics = INTEGRATORS[rule](ElasticJoints(robot), replace(steps, behind=behind(rule)), robot.joints)
+        dynamics = INTEGRATORS[robot.choices.integrator](ElasticJoints(robot), steps, robot.joints)
         rests = starts_at_rest(robot, recording)
         spreads = tuple(memory_spreads(robot).tolist())
         # what only weighs takes the file's matrix: it must not move with its elements while they are estimated

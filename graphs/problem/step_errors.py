@@ -70,7 +70,7 @@ def _missed(whole: SimpsonDynamics, x: Array, calibration: Calibration) -> Array
     # a velocity that is off after the first half moves positions through both, one that is off at the end hardly
     k = d_q.shape[1]
     missed_q = first_q + second_q + 0.25 * steps.h[:, None] * (first_v - second_v)[:, :k] - d_q
-    rows = np.asarray(steps.combine(missed_v, missed_q) / steps.sigmas)
+    rows = np.asarray(whole.combined(missed_v, missed_q) / steps.sigmas)
     if steps.free is not None:
         k = steps.free.shape[1]
         rows[:, :k] = np.where(steps.free > 0.0, 0.0, rows[:, :k])

@@ -14,7 +14,6 @@ from jointscope.factors.calibration import Calibration
 from jointscope.factors.dynamics import DynamicsFactor
 from jointscope.factors.factor import Factor, Linearization
 from jointscope.factors.simpson_dynamics import SimpsonDynamics
-from jointscope.factors.step import Steps
 from jointscope.graphs.problem.bag_problem import BagProblem
 from jointscope.graphs.scoring.columns.column import Column, SensorPart
 from jointscope.graphs.scoring.columns.score_signals import ScoreSignals
@@ -180,30 +179,30 @@ def _add_dynamics(
         first, last = (_at_ends([columns[i] for i in at_ticks], ticks, end) for end in (0, 1))
         between = _stacked([columns[i].between for i in at_ticks], ticks)
         if segment.middle is not None and between.shape[2] == len(at_ticks):
-            by_size[:, :, at_ticks] = _simpson(factor.steps, first, last, between, segment.middle[1][ticks])
+            by_size[:, :, at_ticks] = _simpson(factor, first, last, between, segment.middle[1][ticks])
         else:
-            by_size[:, :, at_ticks] = _defects(factor.steps, first, last)
+            by_size[:, :, at_ticks] = _defects(factor, first, last)
     for i, column in enumerate(columns):
         if column.better_integrator:
             by_size[:, :, i] = _what_simpson_adds(segment, factor, ticks, linear)
     if in_steps:
         held = _stacked([columns[i].in_steps for i in in_steps], ticks)
-        by_size[:, :, in_steps] = _defects(factor.steps, held, held)
+        by_size[:, :, in_steps] = _defects(factor, held, held)
 
 
-def _defects(steps: Steps, first: Array, last: Array) -> Array:
+def _defects(factor: DynamicsFactor, first: Array, last: Array) -> Array:
     """Rows of the dynamics for accelerations at both ends of each step, shape (s, rows, k)."""
-    h = steps.h[:, None, None]
-    positions = len(steps.layout.positions)
+    h = factor.steps.h[:, None, None]
+    positions = len(factor.steps.layout.positions)
     d_q = -(h**2) / 12.0 * (first - last)[:, :positions]
-    return steps.combine(-0.5 * h * (first + last), d_q)
+    return factor.combined(-0.5 * h * (first + last), d_q)
 
 
-def _simpson(steps: Steps, first: Array, last: Array, middle: Array, by_rates: Array) -> Array:
+def _simpson(factor: DynamicsFactor, first: Array, last: Array, middle: Array, by_rates: Array) -> Array:
     """The same by Simpson's rule, whose middle moves along; shape (s, rows, k).
 
     Args:
-        steps: their lengths and noise.
+        factor: of these steps.
         first: accelerations where each step begins, shape (s, r, k).
         last: the same where it ends.
         middle: the same between.
@@ -211,16 +210,17 @@ def _simpson(steps: Steps, first: Array, last: Array, middle: Array, by_rates: A
     """
     from jointscope.graphs.kernels.score_kernel import simpson_columns  # as above
 
+    steps = factor.steps
     d_v, d_q = np.empty_like(first), np.empty((len(first), len(steps.layout.positions), first.shape[2]))
     simpson_columns(steps.h, first, last, middle, np.ascontiguousarray(by_rates), d_v, d_q)
-    return steps.combine(d_v, d_q)
+    return factor.combined(d_v, d_q)
 
 
 def _what_simpson_adds(
     segment: Segment, factor: DynamicsFactor, ticks: NDArray[np.intp], linear: Linearization
 ) -> Array:
     """Defects by Simpson's rule minus those of the model's own, shape (s, rows)."""
-    simpson = SimpsonDynamics(factor.model, replace(factor.steps, behind=0.0), factor.joints)
+    simpson = SimpsonDynamics(factor.model, factor.steps, factor.joints)
     x = segment.signals.x
     return simpson.residual((x[ticks], x[ticks + 1]), segment.calibration) - linear.residual
 

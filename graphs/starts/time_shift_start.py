@@ -43,9 +43,11 @@ def with_best_shifts(
         start: where to begin.
         hold: further blocks that stay.
     """
-    held = DYNAMICS in hold
-    best, estimate = list(problems), start if held else with_placed_trackers(problems, start)
-    for name in () if held else _shifts(problems[0].robot):
+    best = list(problems)
+    if DYNAMICS in hold:
+        return best, start
+    estimate = with_placed_trackers(problems, start)
+    for name in _shifts(problems[0].robot):
         scan = _Scan(best, estimate, name, (DYNAMICS, *hold))
         value = scan.lowest()
         best, estimate = placed(best, {name: value}), _with_value(estimate, name, value)

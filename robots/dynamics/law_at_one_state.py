@@ -158,7 +158,7 @@ def _takes_arrays(here: Sequence[EffectAt], values: Mapping[str, float]) -> bool
     own = [one.own(values) for one in here]
     together = {name: np.array([p[name] for p in own]) for name in own[0]}
     seen: dict[str, Any] = dict(q_link=0.31, v_link=0.7, q_motor=0.3, v_motor=-0.4, tau_spring=0.9, stiffness=40.0)
-    seen |= dict(memory=0.2, gap=(0.01, 0.02)[: len(effect.gap)] or None)
+    seen |= dict(memory=0.2)
     for law in [effect.law] if effect.memory is None else [effect.law, effect.memory.rate]:
         each = [law(JointSignals(**seen), p) for p in own]
         try:

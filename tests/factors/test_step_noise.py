@@ -13,7 +13,7 @@ from jointscope.factors.calibration import Calibration
 from jointscope.factors.euler_dynamics import EulerDynamics
 from jointscope.factors.midpoint_dynamics import MidpointDynamics
 from jointscope.factors.simpson_dynamics import SimpsonDynamics
-from jointscope.factors.step import Steps, behind
+from jointscope.factors.step import Steps
 from jointscope.graphs.fixed_lag.window.tick_step import undivided_step
 from jointscope.robots.dynamics.elastic_joints import ElasticJoints
 from jointscope.robots.dynamics.state_rates import StateRates
@@ -44,7 +44,7 @@ def test_rows_of_white_torques_are_independent_and_of_unit_variance(rule):
         velocity, position = moved_by_noise(rng, density[j])
         x1[:, v] += velocity
         x1[:, q] += position
-    steps = Steps(np.full(COUNT, H), np.tile(u, (COUNT, 1)), robot.noise, layout, behind=behind(rule))
+    steps = Steps(np.full(COUNT, H), np.tile(u, (COUNT, 1)), robot.noise, layout)
     factor = FACTORS[rule](ElasticJoints(robot), steps, robot.joints)
     rows = factor.residual((x0, x1), Calibration.of(robot)) / factor.sigmas
     told = [i for i, name in enumerate(factor.rows) if ".motor_" in name]

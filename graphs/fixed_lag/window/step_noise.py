@@ -11,7 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import lapack
 
-from jointscope.factors.step import behind, position_sigmas, rate_sigmas
+from jointscope.factors.step import position_sigmas, rate_sigmas
+from jointscope.graphs.problem.bag_problem import INTEGRATORS
 from jointscope.robots.model.robot import Robot
 
 Array = NDArray[np.float64]
@@ -28,7 +29,7 @@ class StepNoise:
 
     def __init__(self, robot: Robot):
         self._layout, noise = robot.layout, robot.noise
-        self._behind = behind(robot.choices.integrator)
+        self._behind = INTEGRATORS[robot.choices.integrator].behind
         self._process, self._integrated = noise, noise.model == "integrated"
         # the bodies of the URDF, as where the noise was estimated; effects on inertia do not enter the weights
         self._tree = robot.kinematic_tree
