@@ -167,8 +167,10 @@ def test_four_kinds_find_one_load_that_responses_alone_are_led_astray_by(tmp_pat
     for name in ("swing.stiffness", "swing.damping", "swing.coulomb_torque", "swing.motor_viscous.coefficient"):
         assert value(found.robot, name, lever.truth[name]), name
     (first, held_first), (last, held_last) = found.errors
-    assert set(first) == set(kinds) and all(last[kind] < first[kind] for kind in kinds)
-    assert all(held_last[kind] < held_first[kind] for kind in ("motion", "poses", "rests"))
+    shown = [kind for kind in kinds if kind != "poses"]  # poses of this arm are within their noise without the load
+    assert set(first) == set(kinds) and all(last[kind] < first[kind] for kind in shown)
+    assert all(held_last[kind] < 0.1 * held_first[kind] for kind in ("motion", "rests"))
+    assert first["poses"] < 1.0 and last["poses"] < 1.0 and held_last["poses"] < 1.1
     # what the last model is, as a graph for a user
     assert js.graph(found.steps[-1].model.motion.result).graph.size() < 40
 
