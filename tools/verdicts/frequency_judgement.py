@@ -10,11 +10,12 @@ import numpy as np
 from jointscope.graphs.frequency.calibrate_frequency import FrequencyCalibration
 from jointscope.graphs.frequency.explained import Answered, PoseFit
 from jointscope.graphs.joint_kinds.calibrate_kinds import KindsCalibration
+from jointscope.robots.geometry.arm_effects import FREQUENCY
 from jointscope.robots.geometry.error_parameters import STIFFNESS
 from jointscope.tools.presentation.frequency_sentences import identifiable_sentence, one_realisation, sticking
 from jointscope.tools.presentation.numbers import percent, significant
 from jointscope.tools.verdicts.judgement import Check, Judgement
-from jointscope.tools.verdicts.pose_judgement import judge_poses
+from jointscope.tools.verdicts.pose_judgement import judge_poses, left_out_effects
 from jointscope.tools.verdicts.priors.far_from_priors import NAME as AS_EXPECTED_BY_PRIORS
 from jointscope.tools.verdicts.priors.far_from_priors import far_parameters
 from jointscope.tools.verdicts.same_values import NAME, agreed, test_said
@@ -33,7 +34,8 @@ def judge_frequency(result: FrequencyCalibration) -> Judgement:
     """Applies all checks."""
     checks = tuple(make(result) for make in (_settled, _answer, _noise, _heldout, _agree, _told, _friction))
     level, text = far_parameters(result.robot.parameters, result.told, result.start.path.name)
-    return Judgement.of((*checks, Check(level, AS_EXPECTED_BY_PRIORS, text)))
+    unheard = left_out_effects(result.robot, FREQUENCY)
+    return Judgement.of((*checks, Check(level, AS_EXPECTED_BY_PRIORS, text), *([] if unheard is None else [unheard])))
 
 
 def judge_kinds(result: KindsCalibration) -> Judgement:

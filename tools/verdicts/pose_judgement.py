@@ -18,7 +18,10 @@ from jointscope.graphs.poses.tip_errors import summary
 from jointscope.graphs.poses.trimmed_poses import Outlier
 from jointscope.graphs.poses.untold_distances import untold_distance
 from jointscope.graphs.poses.what_moved import Step, what_moved, with_ends
+from jointscope.robots.geometry.arm_effects import POSES
 from jointscope.robots.geometry.error_parameters import BACKLASH
+from jointscope.robots.geometry.unheard_effects import unheard_effects
+from jointscope.robots.model.robot import Robot
 from jointscope.tools.presentation.numbers import significant
 from jointscope.tools.verdicts.judgement import Check, Judgement
 from jointscope.tools.verdicts.missing_in_arm import missing_by_poses
@@ -41,8 +44,22 @@ APART = (3.0, 10.0)  # [sigma] that a distance which is said may be from that of
 def judge_poses(result: PoseCalibration) -> Judgement:
     """Applies all checks."""
     makers = (_enough, _elsewhere, _repeatability, _turns, _outliers, _still, _within, _near_priors, _apart, _lacks)
-    checks = (make(result) for make in (*makers, _backlash, _worth))
+    checks = (*(make(result) for make in (*makers, _backlash, _worth)), left_out_effects(result.robot, POSES))
     return Judgement.of([check for check in checks if check is not None])
+
+
+def left_out_effects(robot: Robot, kind: str) -> Check | None:
+    """Effects of the robot file that act on recordings of a kind and have no part in their model; None without any."""
+    labels, name = unheard_effects(robot, kind), "Effects of the robot file that take part"
+    if not labels:
+        return None
+    what, where = ("poses", "at rest") if kind == POSES else ("frequency responses", "in a vibration")
+    return Check(
+        "warn",
+        name,
+        f"{', '.join(labels)} of {robot.path.name} {'acts' if len(labels) == 1 else 'act'} {where}, too, and {what} "
+        "leave it out: geometry and stiffnesses take up what it does. Motion and rests have all of the catalogue.",
+    )
 
 
 def _enough(result: PoseCalibration) -> Check:

@@ -44,7 +44,7 @@ def judged(
         problems=(problem,),
         settled=settled,
         stages=4,
-        robot=SimpleNamespace(parameters={} if parameters is None else parameters),
+        robot=SimpleNamespace(parameters={} if parameters is None else parameters, effects=()),
         start=SimpleNamespace(path=Path("arm.yaml")),
     )
     verdict = judge_frequency(result)

@@ -9,11 +9,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from lever_of_all_kinds import Lever
 from measured_poses import PANDA
 
 from jointscope.graphs.poses.calibrate_poses import calibrate_poses
 from jointscope.graphs.poses.untold_distances import untold_distance
 from jointscope.robots.errors import RecordingError
+from jointscope.robots.files.effect_editing import add_effect
 from jointscope.robots.files.robot_file import load_robot
 from jointscope.tools.bags.at_poses.pose_table import pose_table
 from jointscope.tools.bags.at_poses.read_poses import read_poses
@@ -113,6 +115,16 @@ def test_python_of_the_page_about_poses_runs(tx90l, tmp_path, monkeypatch, capsy
     exec(block, {})
     said = capsys.readouterr().out
     assert said.startswith("Yes") and "joint3.stiffness" in said
+
+
+def test_an_effect_of_the_file_that_poses_leave_out_is_told(tmp_path):
+    lever = Lever(tmp_path)
+    curve = {"swing.spring_curve.quadratic": 0.0, "swing.spring_curve.cubic": 8e3}
+    bent = add_effect(lever.robot, "spring_curve@swing")
+    found = [calibrate_poses(robot, [lever.seen()]) for robot in (bent.with_values(curve), bent)]
+    said, none = ([c for c in judge_poses(r).checks if c.name.startswith("Effects of the robot")] for r in found)
+    assert [check.level for check in said] == ["warn"] and none == []
+    assert said[0].text.startswith("spring_curve@swing of lever.yaml acts at rest, too, and poses leave it out")
 
 
 def test_rows_of_one_name_are_told(tx90l, tmp_path):
