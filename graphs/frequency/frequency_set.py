@@ -22,7 +22,8 @@ from jointscope.factors.calibration import DYNAMICS, Calibration
 from jointscope.graphs.frequency.motor_stiffness import MotorStiffness, motor_stiffness
 from jointscope.graphs.frequency.shaken_pose import ShakenPose
 from jointscope.graphs.solving.normal_equations import NormalEquations
-from jointscope.robots.files.sections.frequency_section import COULOMB, INERTIA, VISCOUS
+from jointscope.robots.files.sections.frequency_section import COULOMB, INERTIA
+from jointscope.robots.geometry.error_parameters import VISCOUS
 from jointscope.robots.geometry.flexible_arm import FlexibleArm
 from jointscope.robots.model.robot import SHARPNESS, Robot
 

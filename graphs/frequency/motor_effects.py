@@ -23,7 +23,6 @@ from numpy.typing import NDArray
 from scipy.fft import next_fast_len
 
 from jointscope.graphs.frequency.shaken_pose import ShakenPose
-from jointscope.robots.files.sections.frequency_section import VISCOUS
 from jointscope.robots.geometry.error_parameters import (
     CUBIC,
     LOAD_FRICTION,
@@ -31,6 +30,7 @@ from jointscope.robots.geometry.error_parameters import (
     STRIBECK,
     TORQUE_DELAY,
     TORQUE_SHARE,
+    VISCOUS,
     WAVES,
     WAVES_ORDER,
 )

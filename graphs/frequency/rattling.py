@@ -18,7 +18,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from jointscope.graphs.frequency.shaken_pose import ShakenPose
-from jointscope.robots.files.sections.frequency_section import COULOMB, INERTIA, VISCOUS
+from jointscope.robots.files.sections.frequency_section import COULOMB, INERTIA
+from jointscope.robots.geometry.error_parameters import VISCOUS
 
 Array = NDArray[np.float64]
 NEAR, BESIDE = 0.2, (0.6, 1.0)  # of the standard deviation of T: about zero, and on both sides of it

@@ -30,6 +30,7 @@ LINK_MOMENTS = tuple(f"link_mass.{axis}" for axis in "xyz")  # first moments mor
 LINK_INERTIA = "inertia_error.about_axis"  # of the link behind a joint, more than in the URDF, about the joint's axis
 TORQUE_SHARE = "torque_constant_error.share"  # motors make 1 + share of the torque that they say
 TORQUE_DELAY = "robot.torque_delay.seconds"  # by which torques are said too late
+VISCOUS = "motor_viscous.coefficient"  # of a motor that is shaken
 STRIBECK = "motor_stribeck.torque"  # of the breakaway of a motor's dry friction over that while it turns
 LOAD_FRICTION = "load_dependent_friction.coefficient"  # of the torque that a drive passes on
 

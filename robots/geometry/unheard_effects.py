@@ -20,9 +20,8 @@ from jointscope.robots.effect_kinds.robot_torque import RobotTorque
 from jointscope.robots.effect_kinds.smoothed_reading import SmoothedReading
 from jointscope.robots.effect_kinds.structure import Structure
 from jointscope.robots.effect_kinds.time_shift import TimeShift
-from jointscope.robots.files.sections.frequency_section import COULOMB, VISCOUS
 from jointscope.robots.geometry.arm_effects import KINDS, POSES
-from jointscope.robots.geometry.error_parameters import LINK_MOMENTS
+from jointscope.robots.geometry.error_parameters import LINK_MOMENTS, VISCOUS
 from jointscope.robots.model.robot import Robot
 
 FORMS = ("bearing", "elasticity", "gravity", "axis")  # of structural effects that bend or turn an arm
@@ -41,7 +40,7 @@ def unheard_effects(robot: Robot, kind: str) -> tuple[str, ...]:
 
 def _is_unheard(here: EffectAt, robot: Robot, kind: str) -> bool:
     """Whether one of its sizes is not its null value, and nothing that the arm has."""
-    heard = {f"{here.owner}.{part}" for part in (*LINK_MOMENTS, COULOMB, VISCOUS)}
+    heard = {f"{here.owner}.{part}" for part in (*LINK_MOMENTS, VISCOUS)}
     for known in KINDS:
         if kind not in known.unseen:
             heard |= {*known.parameters(here.owner), f"{here.owner}.{known.catalogue[0]}"}

@@ -8,7 +8,7 @@ from collections.abc import Mapping
 from jointscope.robots.errors import RobotError
 from jointscope.robots.files.sections.sensor_sections import topic_or_usual
 from jointscope.robots.geometry.arm_effects import effect_units
-from jointscope.robots.geometry.error_parameters import BEARING, DAMPING, STIFFNESS, TILT_DAMPING, pose_units
+from jointscope.robots.geometry.error_parameters import BEARING, DAMPING, STIFFNESS, TILT_DAMPING, VISCOUS, pose_units
 from jointscope.robots.model.robot import SHARPNESS, Robot
 from jointscope.robots.parts.frequency_setup import FrequencySetup
 from jointscope.robots.parts.parameter import Parameter
@@ -17,7 +17,7 @@ from jointscope.robots.yaml_section import Section, did_you_mean
 
 TORQUES = Topic("/joint_states", "sensor_msgs/msg/JointState", "effort", "N m")
 POSITIONS = Topic("/joint_states", "sensor_msgs/msg/JointState", "position", "rad")
-INERTIA, COULOMB, VISCOUS = "inertia", "coulomb_torque", "motor_viscous.coefficient"
+INERTIA, COULOMB = "inertia", "coulomb_torque"
 NEEDED = (STIFFNESS, DAMPING, INERTIA)
 
 
