@@ -115,8 +115,20 @@ def _check_targets(problem: PoseSet, target: Array) -> None:
         )
     raise RecordingError(
         f"{poses.path}: the arm misses the measured targets by {1e3 * misses:.3g} mm (rms), {1e3 * left:.3g} mm "
-        f"with a tracker "
-        "anywhere; check names, signs and units of the joints, and the link that carries the target"
+        f"with a tracker anywhere; {_one_for_all(problem)}check names, signs and units of the joints, and the link "
+        "that carries the target"
+    )
+
+
+def _one_for_all(problem: PoseSet) -> str:
+    """That rows of several targets were all taken for the first one, as nothing says whose they are."""
+    setup, poses = problem.robot.poses, problem.poses
+    if setup is None or not setup.others or poses.others:
+        return ""
+    names = ", ".join(target.name for target in setup.targets)
+    return (
+        f"{problem.robot.path.name} has the targets {names}, but all rows count as {problem.targets.first}: "
+        "say in a column `target` whose each row is; else "
     )
 
 

@@ -217,6 +217,14 @@ def test_exchanged_names_and_lost_targets_are_told(robot, simulated):
         calibrate_poses(robot, [replace(poses, others=(replace(left, name="top"), right))])
 
 
+def test_rows_of_several_targets_that_nothing_names_are_told(tmp_path, simulated):
+    wide = tool_with(tmp_path, "left: {at: [0.2, 0.0, 0.03]}")
+    poses = simulate_poses(wide, 20, 3)[0]
+    every_other = np.where(np.arange(20)[:, None] % 2 == 0, poses.target, poses.others[0].place)
+    with pytest.raises(RecordingError, match=r"has the targets reflector, left, but all rows count as reflector: say"):
+        calibrate_poses(wide, [replace(poses, target=every_other, others=())])
+
+
 def test_a_target_in_another_place_on_the_tool_is_told_with_the_place(tmp_path, simulated):
     wrong = tool_with(tmp_path, "left: {at: [0.2, 0.0, 0.03]}")
     with pytest.raises(RecordingError, match=r"left is not where tool.yaml has it on the tool.*at \[0.0794, .* leave"):
