@@ -20,7 +20,7 @@ from jointscope.robots.errors import RecordingError
 from jointscope.robots.model.command_words import edited_argument, robot_argument
 from jointscope.robots.model.robot import Robot
 from jointscope.robots.parts.sensors import Encoder
-from jointscope.robots.recordings.recording import Notice, Recording
+from jointscope.robots.recordings.recording import Notice, Recording, Stream
 from jointscope.robots.recordings.still_stretches import OFTEN, SHORTEST, WITHIN, share_of, standing
 from jointscope.robots.rests.creep import EVEN, PARTS, creep_of, creeping_stretches
 from jointscope.robots.rests.load_history import LoadHistory
@@ -145,8 +145,7 @@ def find_rests(recording: Recording, robot: Robot, loads: LoadHistory) -> Rests:
         np.array, zip(*found, strict=True)
     )
     hung = [loads.at(float(t[1]) - 1e-9) for t in times]
-    first = stream.values[0] - motor.zero
-    moved = _moved(first, q_motor, WITHIN * motor.sigmas)
+    moved = _moved(stream, motor, times, q_motor)
     forces, links = np.array([force for force, _ in hung]), tuple(name for _, name in hung)
     notices = _notices(len(found), swinging, np.array(drifts))
     rests = Rests(
@@ -155,7 +154,7 @@ def find_rests(recording: Recording, robot: Robot, loads: LoadHistory) -> Rests:
     )  # fmt: skip
     last = _last_of_each(rests)
     rests = rests.only(last)
-    moved = _moved(first, rests.q_motor, WITHIN * motor.sigmas) | (rests.creep != 0.0)
+    moved = _moved(stream, motor, rests.times, rests.q_motor) | (rests.creep != 0.0)
     return replace(rests, moved=moved & known[last])
 
 
@@ -208,9 +207,24 @@ def _swung(
     return q, scatter, rounding
 
 
-def _moved(first: Array, q_motor: Array, within: Array) -> NDArray[np.bool_]:
-    """Whether motors have moved since the rest before, or since the recording began."""
-    return np.asarray(np.abs(np.diff(q_motor, axis=0, prepend=first[None])) > within)
+def _moved(stream: Stream, motor: Encoder, times: Array, q_motor: Array) -> NDArray[np.bool_]:
+    """Whether motors have moved since the rest before, or since the recording began, shape (m, n).
+
+    Who left and came back to the same place has moved, too. One reading far off is a glitch, two in a row are motion.
+
+    Args:
+        stream: readings of the motors.
+        motor: their encoder.
+        times: begin and end of the rests, shape (m, 2) [s].
+        q_motor: means, shape (m, n) [rad].
+    """
+    begins = np.searchsorted(stream.times, np.append(stream.times[0], times[:-1, 0]))
+    ends = np.searchsorted(stream.times, times[:, 0])
+    moved = np.zeros(q_motor.shape, dtype=bool)
+    for i, (begin, end) in enumerate(zip(begins.tolist(), ends.tolist(), strict=True)):
+        off = np.abs(stream.values[begin : end + 1] - motor.zero - q_motor[i]) > WITHIN * motor.sigmas
+        moved[i] = off[0] | np.any(off[1:] & off[:-1], axis=0)
+    return moved
 
 
 def _last_of_each(rests: Rests) -> NDArray[np.bool_]:

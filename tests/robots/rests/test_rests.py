@@ -79,6 +79,15 @@ def test_rests_alike_in_a_row_are_one_the_last():
     assert len(rests) == 2 and rests.moved[1, 0] and rests.times[1, 0] > 3.5
 
 
+def test_a_motor_that_left_and_came_back_to_the_same_place_rests_again():
+    sweeps = [
+        np.concatenate([np.linspace(0.4, to, 30), np.linspace(to, 0.4, 30), np.full(200, 0.4)]) for to in (0.2, 0.6)
+    ]
+    again = find_rests(recording(np.concatenate([np.full(200, 0.4), *sweeps])), ROBOT, LoadHistory.none())
+    assert again.q_motor[:, 0] == pytest.approx([0.4, 0.4, 0.4])
+    assert again.moved[:, 0].tolist() == [False, True, True] and not again.moved[:, 1:].any()
+
+
 def test_motion_has_no_rests_and_weights_in_a_hurry_have_none():
     with pytest.raises(RecordingError) as err:
         find_rests(recording(np.linspace(0.0, 3.0, 500)), ROBOT, LoadHistory.none())
