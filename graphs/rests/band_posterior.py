@@ -110,7 +110,13 @@ def _of_each(linear: LinearRests, count: int) -> LinearRests:
 def _moments(linear: LinearRests, least: Array) -> tuple[Array, Array]:
     """Mean and covariance of the change of the values, which may fall to `least`, shape (p,)."""
     unit = 1.0 / np.sqrt(np.diag(linear.A))
-    L = unit[:, None] * np.linalg.inv(np.linalg.cholesky(linear.A * np.outer(unit, unit))).T  # L L' = A^-1
+    try:
+        L = unit[:, None] * np.linalg.inv(np.linalg.cholesky(linear.A * np.outer(unit, unit))).T  # L L' = A^-1
+    except np.linalg.LinAlgError as err:
+        raise SolveError(
+            "the values of these rests have no covariance where they are likeliest: the model contradicts the rests by "
+            "far; loads, units, signs or names may be wrong: look at what `jointscope compare ROBOT --rests BAG` says"
+        ) from err
     motors = [MotorBands.of(linear, j, L, least) for j in np.unique(linear.motor).tolist()]
     c = L.T @ linear.b
     pulled = c + sum((motor.slope for motor in motors), np.zeros_like(c))

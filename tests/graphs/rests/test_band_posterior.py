@@ -4,12 +4,13 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from lever_bench import C0, C1, hanging, lever
 
-from jointscope.graphs.rests.band_posterior import MotorBands
+from jointscope.graphs.rests.band_posterior import MotorBands, _moments
 from jointscope.graphs.rests.calibrate_rests import calibrate_rests
 from jointscope.robots.errors import SolveError
 from jointscope.tools.verdicts.rests.rest_verdict import verdict
@@ -81,6 +82,11 @@ def test_a_band_that_closes_at_a_rest_is_told_and_not_waited_for():
     )
     with pytest.raises(SolveError, match="a friction band closes at one of its 3 rests"):
         closed.moments(np.zeros(1))
+
+
+def test_values_without_a_covariance_are_told_and_no_bug():
+    with pytest.raises(SolveError, match="no covariance where they are likeliest: the model contradicts the rests"):
+        _moments(SimpleNamespace(A=np.array([[1.0, 2.0], [2.0, 1.0]])), np.zeros(2))
 
 
 def test_friction_of_motors_that_creep_as_their_speed_says_is_no_yes(tmp_path):

@@ -6,6 +6,7 @@ from __future__ import annotations
 import re
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -13,8 +14,9 @@ import pytest
 from jointscope.robots.errors import RecordingError
 from jointscope.robots.files.robot_file import load_robot
 from jointscope.robots.rests.angle_units import check_angle_units
+from jointscope.robots.rests.load_history import LoadHistory
 from jointscope.tools.bags.at_poses.load_table import check_loads
-from jointscope.tools.bags.at_poses.read_rests import read_rests
+from jointscope.tools.bags.at_poses.read_rests import _must_be_of, read_rests
 from jointscope.tools.bags.read_recording import read_recording
 from jointscope.tools.bags.write_bag import write_bag
 
@@ -165,3 +167,32 @@ def test_without_limits_motors_and_links_tell_of_each_other(in_degrees, tmp_path
     ):
         check_angle_units(replace(recording, streams=short), free)
     check_angle_units(read_recording(DATA / "static_gravity" / "gravity", ROBOT), free)
+
+
+def lasting(seconds):
+    return SimpleNamespace(streams={"motor_angle": SimpleNamespace(times=np.array([0.0, seconds]))})
+
+
+@pytest.mark.parametrize(
+    ("times", "said"),
+    [
+        (
+            [-3600.0, -3590.0],
+            "all 1 changes of the load are up to 3590 s before it begins; expected stamps on the clock",
+        ),
+        (
+            [2.0, 3600.0],
+            "1 loads are up to 3590 s after its end; expected stamps on the clock of the encoders, from 0 to 10",
+        ),
+    ],
+)
+def test_loads_on_another_clock_than_the_encoders_are_refused(times, said):
+    loads = LoadHistory(np.array(times), np.array([[0.0, 0.0, 0.0], [0.0, 0.0, -9.81]]), ("", "hook"))
+    with pytest.raises(RecordingError, match=f"bench: topic /load: by their header.stamp {said}"):
+        _must_be_of(Path("bench"), lasting(10.0), loads)
+
+
+@pytest.mark.parametrize("times", [[-1.0], [-1.0, 3.0], [0.0, 10.0]])
+def test_a_load_that_was_said_before_the_recording_hangs_there(times):
+    forces = np.arange(3.0 * len(times)).reshape(-1, 3)
+    _must_be_of(Path("bench"), lasting(10.0), LoadHistory(np.array(times), forces, ("hook",) * len(times)))

@@ -76,7 +76,24 @@ def _loads(path: Path, robot: Robot, recording: Recording) -> LoadHistory | None
     check_loads(f"{path}: topic {LOAD}", robot, forces, links, "header.frame_id")
     order = np.argsort(stamps, kind="stable")
     times = (stamps[order] - recording.start_ns) / 1e9
-    return LoadHistory(times, forces[order], tuple(links[i] for i in order))
+    found = LoadHistory(times, forces[order], tuple(links[i] for i in order))
+    _must_be_of(path, recording, found)
+    return found
+
+
+def _must_be_of(path: Path, recording: Recording, loads: LoadHistory) -> None:
+    """Loads change while their recording lasts; one that hangs there all the time may have been said before it."""
+    last = float(max(stream.times[-1] for stream in recording.streams.values()))
+    changes, late = loads.changes, loads.times[loads.times > last]
+    before = bool(len(changes)) and bool(np.all(changes < 0.0))
+    if not (before or len(late)):
+        return
+    where = f"all {len(changes)} changes of the load are" if before else f"{len(late)} loads are"
+    off = f"up to {-changes[0]:.4g} s before it begins" if before else f"up to {late[-1] - last:.4g} s after its end"
+    raise RecordingError(
+        f"{path}: topic {LOAD}: by their header.stamp {where} {off}; expected stamps on the clock of the encoders, from "
+        f"0 to {last:.4g} s of this recording: check the clock of the node that says the loads"
+    )
 
 
 def _must_have_one_clock(path: Path, recording: Recording) -> None:
