@@ -91,8 +91,8 @@ def _must_be_of(path: Path, recording: Recording, loads: LoadHistory) -> None:
     where = f"all {len(changes)} changes of the load are" if before else f"{len(late)} loads are"
     off = f"up to {-changes[0]:.4g} s before it begins" if before else f"up to {late[-1] - last:.4g} s after its end"
     raise RecordingError(
-        f"{path}: topic {LOAD}: by their header.stamp {where} {off}; expected stamps on the clock of the encoders, from "
-        f"0 to {last:.4g} s of this recording: check the clock of the node that says the loads"
+        f"{path}: topic {LOAD}: by their header.stamp {where} {off}; expected stamps on the clock of the encoders, "
+        f"from 0 to {last:.4g} s of this recording: check the clock of the node that says the loads"
     )
 
 
