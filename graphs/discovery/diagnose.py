@@ -49,6 +49,7 @@ Array = NDArray[np.float64]
 
 LEADERS = 3  # candidates that are refitted
 PATIENCE = 2  # times as many, as long as none of them helps: one effect may hide that another one is right
+MOST_REFITS = 4  # times as many at the most, those that ran away included
 LONGEST = 12.0  # [s] of a recording in which the missing torque is estimated
 ADEQUATE = 0.05  # share of the squared error that may stay unexplained
 MUCH = 10.0  # [%] of the drive's torque that no adequate model leaves open, whatever it is
@@ -270,17 +271,18 @@ def _refit_leaders(
     """Refits of the best candidates by label; None for those that ran away.
 
     Once one explains nearly all of the excess, only those whose score comes near its own are refitted, too; where none
-    helps, the next ones are.
+    helps, the next ones are. One that ran away says nothing and takes no other's place.
     """
-    worth = [c for c in scored.candidates if worth_a_refit(c, scored.placebo)][: PATIENCE * leaders]
+    worth = [c for c in scored.candidates if worth_a_refit(c, scored.placebo)][: MOST_REFITS * leaders]
     found, errors, enough = dict[str, ValidatedRefit | Missed | None](), list[float](), 0.0
     left_out = LeftOut.of(base, spans) if worth else None
     refits = side_by_side.in_order(refit_if_it_helps, (base, *spans, left_out, holdout), [c.best for c in worth])
-    for i, candidate in enumerate(worth):
+    for candidate in worth:
         helped = any(after**2 < (1.0 - MATTERS) * error**2 for after in errors)
-        if candidate.plausible < enough or (i >= leaders and helped):
+        tried = sum(each is not None for each in found.values())
+        if candidate.plausible < enough or tried >= leaders * (1 if helped else PATIENCE):
             break
-        report(f"refitting {candidate.label}", 0.5 + 0.5 * min(i / leaders, 1.0))
+        report(f"refitting {candidate.label}", 0.5 + 0.5 * min(tried / leaders, 1.0))
         validated = found[candidate.label] = next(refits)
         if isinstance(validated, ValidatedRefit):
             errors.append(validated.validation.error)
