@@ -11,6 +11,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from jointscope.robots.effect_kinds.effect import LINK_SIDE
 from jointscope.robots.effect_kinds.effect_at import EffectAt
 from jointscope.robots.effect_kinds.inertia_effect import InertiaEffect
 from jointscope.robots.effect_kinds.joint_torque import JointSignals, JointTorque
@@ -62,12 +63,12 @@ def _acts(here: EffectAt, robot: Robot, kind: str) -> bool:
         return not at_rest or any(np.any(change[name][:STATIC] != 0.0) for name, value in own.items() if value)
     if isinstance(effect, ReadingEffect):
         t, some = np.zeros(2), np.array([[0.3], [0.7]])
-        if here.owner.removesuffix(".link") not in robot.joints:
+        if here.owner.removesuffix(LINK_SIDE) not in robot.joints:
             return False
         read = effect.law(some, t, own)
         return at_rest or bool(np.ptp(np.real(read)) > 0.0)  # a zero that is off shakes nothing
     if isinstance(effect, SmoothedReading | TimeShift):
-        return not at_rest and here.owner.removesuffix(".link") in robot.joints
+        return not at_rest and here.owner.removesuffix(LINK_SIDE) in robot.joints
     return isinstance(effect, RobotTorque | LaggingReading) or (isinstance(effect, Structure) and effect.form in FORMS)
 
 
