@@ -72,7 +72,7 @@ def _rows(problem: RestSet, calibration: Calibration, known: Array, x: Array) ->
     """Derivatives of whitened rows by states, shape (c, k, d), and by values, shape (c, k, p)."""
     torques = problem.torques(x, calibration)
     _, J, P = problem.equations(x, torques, calibration)
-    bands = problem.bands(torques, calibration)
+    bands = problem.bands(x, torques, calibration)
     (y_J, y_P), (_, half_P) = bands.y_slopes, bands.half_slopes
     w_y = 1.0 / np.sqrt(bands.half**2 / 3.0 + bands.sigma**2)[:, :, None]
     spread = np.sqrt(np.maximum(np.einsum("cnp,pq,cnq->cn", half_P, known, half_P), 1e-12 * bands.half**2))
@@ -102,6 +102,7 @@ def _rests_at(like: Rests, q: Array, forces: Array, links: tuple[str, ...]) -> R
         like, times=np.zeros((c, 2)), q_motor=q.copy(), q_link=None if like.q_link is None else q.copy(),
         u=np.zeros_like(q), motor_scatter=motor, link_scatter=link, u_scatter=u, forces=forces, links=links,
         moved=np.ones(q.shape, dtype=bool), creep=np.zeros_like(q), rounding=None,
+        turning_points=None,
     )  # fmt: skip
 
 

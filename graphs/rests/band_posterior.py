@@ -9,7 +9,8 @@ motor's bands tell of a few combinations z of the values; over these it is sampl
 
 z ~ N(0, 1) without the bands, (1 + G z)^n as the n commands were recorded and not the torques (linear_rests.py). The
 two moments of z stand in the joint Gaussian in place of the bands. What is not known of the likelihood is sampled
-along: which share of the motors slid to where they rest, how near to the edge they stayed, and how well edges repeat.
+along: which share of the motors slid to where they rest, how near to the edge they stayed, how much of what friction
+can hold swings of the links took off, and how well edges repeat.
 """
 
 from __future__ import annotations
@@ -140,7 +141,7 @@ class MotorBands:
     """Bands of one motor at m rests, over r combinations z of the values.
 
     Attributes:
-        y, half, noise, scale: shape (m,) [N m].
+        y, half, noise, scale, before: shape (m,) [N m].
         Y, H: slopes, shape (m, r).
         V: the combinations that they tell of, among whitened changes of the values, shape (p, r).
         slope: of the cost by these changes, shape (p,).
@@ -153,6 +154,7 @@ class MotorBands:
     half: Array
     noise: Array
     scale: Array
+    before: Array
     Y: Array
     H: Array
     V: Array
@@ -166,7 +168,8 @@ class MotorBands:
     def of(linear: LinearRests, j: int, L: Array, least: Array) -> MotorBands:
         """Of motor j, over changes L z of the values, which may fall to `least`, shape (p,)."""
         own, bounded = linear.motor == j, np.isfinite(least)
-        y, half, noise, scale = (part[own] for part in (linear.y, linear.half, linear.sigma, linear.scale))
+        y, half, noise = linear.y[own], linear.half[own], linear.sigma[own]
+        scale, before = linear.scale[own], linear.before[own]
         Y, H, G = linear.Y[own] @ L, linear.H[own] @ L, linear.G[j] @ L
         found = band_cost(y, half, np.hypot(EDGE * scale, noise))
         told, vectors = np.linalg.eigh(
@@ -181,9 +184,9 @@ class MotorBands:
         yy, yh, hh = (part[:, None] for part in band_cost(y, half, np.hypot(wide, noise)).curvature)
         curved = Y.T @ (yy * Y + yh * H) + H.T @ (yh * Y + hh * H) + len(half) * np.outer(G, G)
         start = np.linalg.inv(np.eye(V.shape[1]) + curved)
-        return MotorBands(y, half, noise, scale, Y, H, V, slope, G, L[bounded] @ V, least[bounded], start)
+        return MotorBands(y, half, noise, scale, before, Y, H, V, slope, G, L[bounded] @ V, least[bounded], start)
 
-    def cost(self, z: Array, odds: Array, depth: Array, blur: Array, slope: Array) -> Array:
+    def cost(self, z: Array, odds: Array, depth: Array, blur: Array, taken: Array, slope: Array) -> Array:
         """Of k points, shape (k,).
 
         Args:
@@ -191,17 +194,19 @@ class MotorBands:
             odds: logit of the share in piles, shape (k,).
             depth: logarithm of the depth of the piles, of the band, shape (k,).
             blur: logarithm of that of the edges, of the friction, shape (k,).
+            taken: share of what swings may have taken off, that they took, shape (k,).
             slope: of the cost without these bands, shape (r,).
         """
         half, gain, found = self.half + z @ self.H.T, 1.0 + z @ self.G, np.full(len(z), np.inf)
         inside = np.all(half > 0.0, axis=1) & (gain > 0.0) & np.all(z @ self.T.T > self.least, axis=1)
         inside &= (odds < MOST_ODDS) & (odds > NONE)
-        for value, (low, high) in ((depth, DEPTHS), (blur, BLURS)):
+        for value, (low, high) in ((depth, DEPTHS), (blur, BLURS), (taken, (0.0, 1.0))):
             inside &= (value > low) & (value < high)
         if inside.any():
             z, share = z[inside], expit(odds[inside])
             sigma = np.hypot(np.exp(blur[inside])[:, None] * self.scale, self.noise)
-            bands = piled_cost(self.y + z @ self.Y.T, half[inside], sigma, share, np.exp(depth[inside]))
+            gap = taken[inside, None] * self.before
+            bands = piled_cost(self.y + z @ self.Y.T, half[inside], sigma, share, np.exp(depth[inside]), gap)
             costs = bands + np.log(sigma)  # of densities, whose blur is not the same
             costs -= np.log(gain[inside])[:, None]
             jeffreys = -0.5 * np.log(share * (1.0 - share))  # his prior of a share, on the axis of its logit
@@ -213,10 +218,11 @@ class MotorBands:
         """Mean and covariance of z; `slope` as of `cost`."""
         rng, r = np.random.default_rng(SEED), len(slope)
         z = rng.normal(size=(WALKERS, r)) @ np.linalg.cholesky(self.start).T
-        rest = rng.uniform((NONE, DEPTHS[0], BLURS[0]), (2.0, DEPTHS[1], BLURS[1]), (WALKERS, 3))
+        low, high = (NONE, DEPTHS[0], BLURS[0], 0.0), (2.0, DEPTHS[1], BLURS[1], 1.0)
+        rest = rng.uniform(low, high, (WALKERS, len(low)))
 
         def cost(point: Array) -> Array:
-            return self.cost(point[:, :r], point[:, r], point[:, r + 1], point[:, r + 2], slope)
+            return self.cost(point[:, :r], *point[:, r:].T, slope)
 
         for _ in range(MOST_SHRINKS):
             lost = ~np.isfinite(cost(np.hstack([z, rest])))

@@ -272,9 +272,9 @@ def check_bands(whole: RestSet, x: Array, calibration: Calibration) -> None:
     Raises:
         SolveError: the friction of a joint ran away.
     """
-    torques = whole.torques(x, calibration)
-    held = np.where(whole.rests.moved, np.abs(torques.held.value), 0.0).max(axis=0, initial=0.0)
-    usual = np.median(torques.half.value, axis=0)
+    bands = whole.bands(x, whole.torques(x, calibration), calibration)
+    held = np.where(whole.rests.moved, np.abs(bands.y), 0.0).max(axis=0, initial=0.0)
+    usual = np.median(bands.half, axis=0)
     away = (np.sum(whole.rests.moved, axis=0) >= FEWEST_HELD) & (usual > RAN_AWAY * held)
     if away.any():
         j = int(np.argmax(away))

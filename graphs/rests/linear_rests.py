@@ -35,6 +35,7 @@ class LinearRests:
         A, b: shape (p, p) and (p,), priors included.
         y, half, Y, H: shape (M,) and (M, p) [N m].
         sigma, scale: of the M bands, noise without the blur of the edges, and what this is relative to [N m].
+        before: as of `RestBands`, shape (M,) [N m].
         motor: number of the motor of each band, shape (M,).
         counts: bands of each of the n motors, shape (n,).
         G: slopes of the logarithm of each motor's gain, shape (n, p).
@@ -48,6 +49,7 @@ class LinearRests:
     H: Array
     sigma: Array
     scale: Array
+    before: Array
     motor: Columns
     counts: Array
     G: Array
@@ -65,7 +67,7 @@ class LinearRests:
         """
         torques = problem.torques(x, calibration)
         r, J, P = problem.equations(x, torques, calibration)
-        bands = replace(problem, edge=0.0).bands(torques, calibration)
+        bands = replace(problem, edge=0.0).bands(x, torques, calibration)
         transposed = np.swapaxes(J, 1, 2)
         cross = transposed @ P
         covariance = np.linalg.inv(transposed @ J)
@@ -80,9 +82,10 @@ class LinearRests:
         noise = np.hypot(bands.sigma, np.sqrt(np.einsum("mnd,mde,mne->mn", by_x, covariance, by_x)))
         scale = np.broadcast_to(problem.friction_scale, y.shape)
         half = np.maximum(half, 1e-3 * scale)
-        y, half, Y, H, noise, scale = (part[kept] for part in (y, half, Y, H, noise, scale))
+        y, half, Y, H, noise, scale, before = (p[kept] for p in (y, half, Y, H, noise, scale, bands.before))
         G = bands.log_gain_slopes
-        return LinearRests(0.5 * (A + A.T), b, y, half, Y, H, noise, scale, np.nonzero(kept)[1], counts, G)
+        motor = np.nonzero(kept)[1]
+        return LinearRests(0.5 * (A + A.T), b, y, half, Y, H, noise, scale, before, motor, counts, G)
 
     def moved(self, d: Array) -> LinearRests:
         """The same about values that are d further, shape (p,)."""

@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 
 from jointscope.factors.calibration import DYNAMICS, Calibration
 from jointscope.graphs.rests.independent_states import of_independent_states
-from jointscope.graphs.rests.rest_bands import RestBands, Rows
+from jointscope.graphs.rests.rest_bands import RestBands, Rows, largest_held
 from jointscope.graphs.solving.normal_equations import NormalEquations
 from jointscope.graphs.solving.whole_set import WholeSet
 from jointscope.robots.bodies.known_loads import known_loads
@@ -140,11 +140,11 @@ class RestSet:
         loads = known_loads(tree, self.rests.links, self.rests.forces, q)
         return loads.torque, tree.torque(q, 0.0 * q, 0.0 * q)
 
-    def torques(self, x: Array, calibration: Calibration) -> AtRest:
-        """What holds the robot at positions of shape (m, d)."""
+    def torques(self, x: Array, calibration: Calibration, more: Array | float = 0.0) -> AtRest:
+        """What holds the robot at positions of shape (m, d), under its mean commands and some more, shape (m, n)."""
         robot, model, q = self.robot, self.model, x[:, self.robot.layout.q_link]
         loads = known_loads(robot.kinematic_tree, self.rests.links, self.rests.forces, q)
-        u, slopes = acting_commands(robot, self.rests.u, model.named(calibration.values))
+        u, slopes = acting_commands(robot, self.rests.u + more, model.named(calibration.values))
         found = at_rest(model, x, u, calibration.values, loads, self.rests.creep)
         free = {name: slope for name, slope in slopes.items() if name in model.names}
         if not free:
@@ -199,7 +199,7 @@ class RestSet:
         torques = self.torques(x, calibration)
         r, J, P = self.equations(x, torques, calibration)
         costs = 0.5 * np.sum(r**2, axis=1)
-        of_bands, band_costs = self.bands(torques, calibration).rows(expected or self.scoring)
+        of_bands, band_costs = self.bands(x, torques, calibration).rows(expected or self.scoring)
         r, J, P = (np.hstack([a, b]) for a, b in zip((r, J, P), of_bands, strict=True))
         return r, J, P, costs + band_costs
 
@@ -212,15 +212,20 @@ class RestSet:
         r, J, P = (np.hstack([part[i] for part in parts]) for i in range(3))
         return r, J, P
 
-    def bands(self, torques: AtRest, calibration: Calibration) -> RestBands:
-        """What friction holds where motors stand."""
-        plain = np.ones_like(torques.half.value)
-        y, *y_slopes = self._scaled(torques.held, plain, calibration)
-        half, *half_slopes = self._scaled(torques.half, plain, calibration)
+    def bands(self, x: Array, torques: AtRest, calibration: Calibration) -> RestBands:
+        """What friction holds where motors stand at positions x of shape (m, d), whose torques these are.
+
+        Where links swung on while a motor stood, the turning point counts at which friction held most.
+        """
+        held, of_band, noise, before = largest_held(self, x, torques, calibration)
+        sigma = np.hypot(self._band_sigma(calibration), noise)
+        plain = np.ones_like(of_band.value)
+        y, *y_slopes = self._scaled(held, plain, calibration)
+        half, *half_slopes = self._scaled(of_band, plain, calibration)
         counts = (self.rests.moved & (self.rests.creep == 0.0)).astype(float)
-        half, sigma = np.maximum(half, SMALLEST_BAND), self._band_sigma(calibration)
+        half = np.maximum(half, SMALLEST_BAND)
         slopes = (y_slopes[0], y_slopes[1]), (half_slopes[0], half_slopes[1])
-        return RestBands(y, half, *slopes, sigma, counts, *self._log_gain(calibration))
+        return RestBands(y, half, *slopes, sigma, before, counts, *self._log_gain(calibration))
 
     def _log_gain(self, calibration: Calibration) -> tuple[Array, Array]:
         """Logarithm of the torque per command of each motor, relative to its prior, and its derivative by coordinates.

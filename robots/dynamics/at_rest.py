@@ -42,6 +42,15 @@ class WithSlopes:
     by_position: Array
     by_parameter: Array
 
+    def where(self, these: NDArray[np.bool_], others: WithSlopes) -> WithSlopes:
+        """`these` of it, shape (m, k), and all else of others."""
+        wide = these[:, :, None]
+        return WithSlopes(
+            np.where(these, self.value, others.value),
+            np.where(wide, self.by_position, others.by_position),
+            np.where(wide, self.by_parameter, others.by_parameter),
+        )
+
 
 @dataclass(frozen=True)
 class AtRest:

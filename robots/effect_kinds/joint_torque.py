@@ -151,8 +151,8 @@ def smooth_sign(x: Any, width: float) -> Any:
 
 
 def smooth_abs(x: Any, width: float) -> Any:
-    """sqrt(x^2 + width^2) - width: |x| with a rounded tip."""
-    return np.sqrt(x * x + width * width) - width
+    """|x| as x tanh(x / width): with a rounded tip, and |x| itself a few widths away from it."""
+    return x * np.tanh(x / width)
 
 
 def log_cosh(x: Any) -> Any:

@@ -29,8 +29,7 @@ EFFECT = JointTorque(
     card=Card(
         title="friction that grows with the load",
         law="b a_motor = ... - mu_L |tau_c| tanh(k v_motor), with mu_L = coefficient, tau_c the torque of the spring; "
-        "of a rigid joint the weight that it carries; |x| is rounded, sqrt(x^2 + w^2) - w with w = 0.05 N m, so that "
-        "dry friction takes up mu_L w",
+        "of a rigid joint the weight that it carries; the tip of |x| is rounded, x tanh(x / w) with w = 0.05 N m",
         explanation="The torque that a gear or a belt passes on presses its surfaces together, so that friction rises "
         "with it. What arrives is then a fixed share less than what is sent.",
         source="Ho, Kisner (BioRob), eq. (12), (14): stiction as a function of the stress in the joint; Bittencourt, "

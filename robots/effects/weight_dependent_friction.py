@@ -15,7 +15,7 @@ from jointscope.robots.effect_kinds.joint_torque import JointSignals, JointTorqu
 if TYPE_CHECKING:
     from jointscope.robots.effect_kinds.robot_view import RobotView
 
-WIDTH = 1e-5  # [N m] load below which the corner is rounded; c1 times it is missing from the friction of larger ones
+WIDTH = 1e-5  # [N m] load below which the corner is rounded
 
 
 def law(s: JointSignals, p: Mapping[str, Any]) -> Any:

@@ -15,22 +15,21 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from jointscope.robots.dynamics.transmission import joint_angles
 from jointscope.robots.errors import RecordingError
 from jointscope.robots.model.command_words import edited_argument, robot_argument
 from jointscope.robots.model.robot import Robot
 from jointscope.robots.parts.sensors import Encoder
 from jointscope.robots.recordings.recording import Notice, Recording, Stream
 from jointscope.robots.recordings.still_stretches import OFTEN, SHORTEST, WITHIN, share_of, standing
-from jointscope.robots.rests.creep import EVEN, PARTS, creep_of, creeping_stretches
+from jointscope.robots.rests.creep import PARTS, creep_of, creeping_stretches
+from jointscope.robots.rests.left_out import SWINGING, drift, notices_of, why_none
 from jointscope.robots.rests.load_history import LoadHistory
 from jointscope.robots.rests.swing import middle_of_swing
+from jointscope.robots.rests.turning_points import TurningPoints, still_swinging, turning_points
 
 Array = NDArray[np.float64]
 SHARES = (1.0, 0.7, 0.5, 0.35, 0.25)  # of its end that may be looked at; that counts whose parts agree best
-SWINGING = 12.0  # [sigma] of a link encoder that the means of parts may differ by
 ARRAYS = ("times", "q_motor", "u", "motor_scatter", "link_scatter", "u_scatter", "forces", "moved", "creep")
-MANY = 0.1  # of the rests, in which links that move on steadily are no accident
 FEWEST = 3  # rests; fewer, where motors do not stand often, are motion
 
 
@@ -51,6 +50,7 @@ class Rests:
         notices: what was left out.
         rounding: what a swing across the steps of a link encoder leaves of its sigma, shape (m, n); 1 where it stands,
             None where all do.
+        turning_points: of links that swung on while motors stood already; None where none did.
     """
 
     path: str
@@ -68,6 +68,7 @@ class Rests:
     creep: Array
     notices: tuple[Notice, ...] = ()
     rounding: Array | None = None
+    turning_points: TurningPoints | None = None
 
     def __len__(self) -> int:
         return len(self.q_motor)
@@ -77,7 +78,13 @@ class Rests:
         some = {name: getattr(self, name)[kept] for name in ARRAYS}
         links = tuple(link for link, keep in zip(self.links, kept.tolist(), strict=True) if keep)
         q_link, rounding = (None if part is None else part[kept] for part in (self.q_link, self.rounding))
-        return replace(self, q_link=q_link, rounding=rounding, links=links, **some)
+        turns = None if self.turning_points is None else self.turning_points.only(kept)
+        return replace(self, q_link=q_link, rounding=rounding, turning_points=turns, links=links, **some)
+
+    @property
+    def turned(self) -> TurningPoints:
+        """`turning_points` of all rests."""
+        return self.turning_points or TurningPoints.none(*self.q_motor.shape)
 
     @property
     def rounded(self) -> Array:
@@ -94,7 +101,10 @@ def joined_rests(recordings: Sequence[Rests]) -> Rests:
     links, notices = (sum((getattr(rests, name) for rests in recordings), ()) for name in ("links", "notices"))
     paths = ", ".join(rests.path for rests in recordings)
     together["rounding"] = np.concatenate([rests.rounded for rests in recordings])
-    return Rests(paths, "", q_link=np.concatenate(seen) if seen else None, links=links, notices=notices, **together)
+    swung = any(rests.turning_points is not None for rests in recordings)
+    turns = TurningPoints.joined([rests.turned for rests in recordings]) if swung else None
+    q_link = np.concatenate(seen) if seen else None
+    return Rests(paths, "", q_link=q_link, links=links, notices=notices, turning_points=turns, **together)
 
 
 def find_rests(recording: Recording, robot: Robot, loads: LoadHistory) -> Rests:
@@ -112,28 +122,33 @@ def find_rests(recording: Recording, robot: Robot, loads: LoadHistory) -> Rests:
     stream, still = recording.streams[motor.name], standing(recording, robot)
     stretches = _split(sorted([*still, *creeping_stretches(recording, robot, still)]), loads.changes)
     stands = set(_split(still, loads.changes))
-    found, swinging, drifts = [], 0, []
+    found, swinging, drifts, turns = [], 0, list[float](), list[TurningPoints]()
     for t0, t1 in stretches:
         a = _most_settled(recording, motor.name if link is None else link.name, t0, t1)
         q_motor, motor_scatter = _mean(recording, motor.name, a, t1)
         u, u_scatter = _mean(recording, "command", a, t1)
         q_link, link_scatter = (q_motor * np.nan, q_motor * 0.0) if link is None else _mean(recording, link.name, a, t1)
-        drifts.append(_drift(recording, robot, t0, t1))
+        drifts.append(drift(recording, robot, t0, t1))
         if link is not None and np.any(link_scatter > SWINGING * link.sigmas):
             swinging += 1
             continue
-        rounding = np.ones_like(q_link)
+        rounding, turned = np.ones_like(q_link), TurningPoints.none(1, robot.n)
         if link is not None and (t0, t1) in stands:
             q_link, link_scatter, rounding = _swung(recording, link, (t0, t1), q_link, link_scatter)
+            turned = turning_points(recording, robot, (t0, t1), q_link - link.zero, u)
+        turns.append(turned)
         zero = 0.0 if link is None else link.zero
         creep, known = creep_of(stream, motor.sigmas, a, t1)
+        if np.any(creep):
+            known &= (creep == 0.0) | ~still_swinging(recording, robot, (a, t1))
+            creep = np.where(known, creep, 0.0)
         positions, scatters = (
             (q_motor - motor.zero, q_link - zero, u),
             (motor_scatter, link_scatter, u_scatter, rounding),
         )
         found.append((known, creep, np.array([a, t1]), *positions, *scatters))
     if not found:
-        raise RecordingError(_why_none(recording, still, stretches, swinging))
+        raise RecordingError(why_none(recording, still, stretches, swinging))
     share = share_of(still, stream.times)
     if len(found) < FEWEST and share < OFTEN:
         raise RecordingError(
@@ -147,10 +162,11 @@ def find_rests(recording: Recording, robot: Robot, loads: LoadHistory) -> Rests:
     hung = [loads.at(float(t[1]) - 1e-9) for t in times]
     moved = _moved(stream, motor, times, q_motor)
     forces, links = np.array([force for force, _ in hung]), tuple(name for _, name in hung)
-    notices = _notices(len(found), swinging, np.array(drifts))
+    notices = notices_of(len(found), swinging, np.array(drifts))
     rests = Rests(
         recording.path, recording.sha256, times, q_motor, None if link is None else q_link, u,
         motor_scatter, link_scatter, u_scatter, forces, links, moved, creep, notices, rounding,
+        TurningPoints.joined(turns) if any(turned.any for turned in turns) else None,
     )  # fmt: skip
     last = _last_of_each(rests)
     rests = rests.only(last)
@@ -236,57 +252,3 @@ def _last_of_each(rests: Rests) -> NDArray[np.bool_]:
         for i in range(len(rests) - 1)
     ]
     return ~np.array([*same, False], dtype=bool)
-
-
-def _drift(recording: Recording, robot: Robot, t0: float, t1: float) -> float:
-    """How far a link moves on steadily in a stretch, without what its motor turns it; 0 where all stand or swing [rad].
-
-    Nothing but a load that changes does so.
-    """
-    motor, link = robot.motor_encoder, robot.link_encoder
-    if link is None:
-        return 0.0
-    parts = []
-    for encoder in (motor, link):
-        stream = recording.streams[encoder.name]
-        inside = stream.values[(stream.times >= t0) & (stream.times < t1)] - encoder.zero
-        if len(inside) < PARTS:
-            return 0.0
-        parts.append(np.array([part.mean(axis=0) for part in np.array_split(inside, PARTS)]))
-    steps = np.diff(parts[1] - joint_angles(robot, parts[0]), axis=0)
-    mean = steps.mean(axis=0)
-    steady = np.all(steps * np.sign(mean) > EVEN * np.abs(mean), axis=0) & (
-        np.abs(mean) * PARTS > SWINGING * link.sigmas
-    )
-    return float(np.max(np.where(steady, np.abs(mean) * PARTS, 0.0)))
-
-
-def _notices(count: int, swinging: int, drifts: Array) -> tuple[Notice, ...]:
-    found, many = [], int(np.sum(drifts > 0.0))
-    if swinging:
-        text = f"rests: left out {swinging} of {count + swinging} in which a link still swung when the next one began"
-        found.append(Notice("rests", "dropped", swinging, text))
-    if many and many >= MANY * len(drifts):
-        text = (
-            f"rests: in {many} of {len(drifts)} a link moves on steadily, by up to {1e3 * drifts.max():.2g} mrad, "
-            "while motors and /load stand: loads change that /load does not say, or links creep; check the topic"
-        )
-        found.append(Notice("rests", "info", many, text))
-    return tuple(found)
-
-
-def _why_none(
-    recording: Recording,
-    standing: Sequence[tuple[float, float]],
-    stretches: Sequence[tuple[float, float]],
-    swinging: int,
-) -> str:
-    if swinging:
-        reason = (
-            f"the motors stand {len(stretches)} times, and a link swings through each; hold every weight for longer"
-        )
-    elif standing:
-        reason = f"the load changes within {SHORTEST:g} s wherever the motors stand; hold every weight for longer"
-    else:
-        reason = f"no motor stands for {SHORTEST:g} s; a recording of motion stands before the first option"
-    return f"{recording.path}: no rests: {reason}"

@@ -9,9 +9,9 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import numpy as np
-from lever_bench import C0, C1, K2, K3, K
+from lever_bench import C1, K2, K3, K
 from numpy.typing import NDArray
-from two_levers import DRY, STIFFNESS
+from two_levers import STIFFNESS
 
 from jointscope.robots.recordings.recording import Recording, Stream
 from jointscope.robots.rests.load_history import LoadHistory
@@ -21,6 +21,7 @@ Law = Callable[[Array], Array]
 G, RATE, SMALL = 9.81, 100.0, 1e-3  # [m/s^2], [Hz] of all streams, [s] of a step of integration
 MOVES = 0.5  # [s] from one rest to the next
 HELD = (1.0, 2.5)  # [s] of a rest
+DRY = np.array([0.7, 0.4])  # [N m] of friction, which holds motors while links swing: more than springs take off
 PULLS = (0.0, 4.0, 8.0, 12.0, -4.0, -8.0, -12.0)  # [N] sideways at the lever's hook
 
 
@@ -52,8 +53,11 @@ def swinging_lever(count: int, seed: int, step: float, swing: float) -> tuple[Re
     def acceleration(q: Array, v: Array) -> Array:
         return (weight(q) - spring(q - motor) - 0.15 * v) / (0.02 + 2.0 * 0.3**2)
 
-    u = -tau + (C0 + C1 * np.abs(tau)) * rng.uniform(-1.0, 1.0, tau.shape)
-    recording, begins = _recorded(rng, ("swing",), motor, rest, u, acceleration, step, swing)
+    def held(swung: Array) -> Array:
+        return np.abs(spring(swung - motor) - tau)
+
+    friction = DRY[0] + C1 * np.abs(tau)
+    recording, begins = _recorded(rng, ("swing",), motor, rest, (tau, friction, held), acceleration, step, swing)
     forces = np.column_stack([pull, 0.0 * pull, 0.0 * pull])
     return recording, LoadHistory(begins, forces, ("hook",) * count), rest
 
@@ -80,8 +84,11 @@ def swinging_pair(count: int, seed: int, step: float, swing: float) -> tuple[Rec
         first = lower * force[:, 0] - m12 * force[:, 1]
         return np.column_stack([first, m11 * force[:, 1] - m12 * force[:, 0]]) / det[:, None]
 
-    u = -weight(rest) + DRY * rng.uniform(-1.0, 1.0, rest.shape)
-    recording, _ = _recorded(rng, ("a", "b"), motor, rest, u, acceleration, step, swing)
+    def held(swung: Array) -> Array:
+        return STIFFNESS * np.abs(swung - rest)
+
+    drives = (weight(rest), DRY, held)
+    recording, _ = _recorded(rng, ("a", "b"), motor, rest, drives, acceleration, step, swing)
     return recording, LoadHistory.none(), rest
 
 
@@ -90,12 +97,15 @@ def _recorded(
     joints: tuple[str, ...],
     motor: Array,
     rest: Array,
-    u: Array,
+    drives: tuple[Array, Array, Callable[[Array], Array]],
     acceleration: Callable[[Array, Array], Array],
     step: float,
     swing: float,
 ) -> tuple[Recording, Array]:
-    """Streams, and when the load of each rest begins to act [s]."""
+    """Streams, and when the load of each rest begins to act [s].
+
+    `drives` are torques on the links, what friction can hold, and what of it a swing takes for itself.
+    """
     count = len(rest)
     held = np.round(rng.uniform(*HELD, count) * RATE).astype(int)
     q = rest + swing * rng.uniform(-1.0, 1.0, (count, 1)) * rng.uniform(0.5, 1.0, rest.shape)
@@ -109,6 +119,8 @@ def _recorded(
         k4 = acceleration(q + SMALL * (v + 0.5 * SMALL * k2), v + SMALL * k3)
         q, v = q + SMALL * v + SMALL**2 / 6.0 * (k1 + k2 + k3), v + SMALL / 6.0 * (k1 + 2.0 * k2 + 2.0 * k3 + k4)
     swung, between = np.array(seen), int(MOVES * RATE)
+    tau, friction, taken = drives
+    u = -tau + (friction - np.max([taken(q) for q in swung], axis=0)) * rng.uniform(-1.0, 1.0, rest.shape)
     share = np.linspace(0.0, 1.0, between, endpoint=False)[:, None]
     sides: list[list[Array]] = [[], [], []]
     begins = np.cumsum([0, *(held[:-1] + between)]) / RATE - 0.5 * MOVES

@@ -71,6 +71,7 @@ def test_a_band_that_closes_at_a_rest_is_told_and_not_waited_for():
         half,
         one,
         one,
+        0.0 * one,
         one[:, None],
         nothing,
         np.eye(1),
