@@ -24,6 +24,7 @@ from jointscope.graphs.rests.rest_set import EDGE, RestSet
 from jointscope.graphs.rests.rests_by_values import SaidElsewhere
 from jointscope.graphs.rests.seen_rests import SeenRests
 from jointscope.graphs.rests.settling import settled
+from jointscope.graphs.rests.unheard_speeds import as_given, with_priors, without_motion
 from jointscope.graphs.rests.unnoticed import Unnoticed, unnoticed
 from jointscope.graphs.solving.batch_solver import Progress, Solution, solve
 from jointscope.graphs.solving.estimate import Estimate
@@ -141,7 +142,8 @@ def calibrate_rests(
         SolveError: no convergence.
     """
     began, report = time.perf_counter(), progress or (lambda text, share: None)
-    robot = with_knots(robot, recordings)
+    given = with_knots(robot, recordings)
+    robot, unheard = without_motion(given, recordings)
     problems, solution, iterations = settled_rests(robot, recordings, report, near, beside)
     x, likeliest = solution.estimate.states[0], solution.estimate.calibrations[0]
     whole = RestSet.joined(problems)
@@ -156,6 +158,9 @@ def calibrate_rests(
     peak = robot.with_values({name: value for name, value in of_likeliest if name in known})
     found = robot.with_values({p.name: p.value for p in told})
     found = replace(found, parameters=with_sigmas(found.parameters, {p.name: p.sigma for p in told}))
+    peak, found = (as_given(each, given, unheard) for each in (peak, found))
+    covariance = with_priors(covariance * np.outer(scale, scale), calibration.names, given)
+    problems = [problem.of_robot(given) for problem in problems]
     derived = [
         p for p, result in zip(derived_results(robot, calibration, covariance), robot.derived, strict=True)
         if set(result.of) <= known
@@ -165,16 +170,16 @@ def calibrate_rests(
     return RestCalibration(
         robot=found,
         likeliest=peak,
-        start=robot,
+        start=given,
         problems=tuple(problems),
         states=states_of(problems, solution),
         parameters=tuple(told),
         derived=tuple(derived),
-        silent=tuple(p.name for p in table if p.name not in known),
-        covariance=covariance * np.outer(scale, scale),
+        silent=tuple(name for name in Calibration.of(given).names if name not in known),
+        covariance=covariance,
         doubts=asked.doubts() if asked else (),
         unnoticed=unnoticed(asked, robot) if asked else (),
-        before=rest_errors([problem.of_robot(robot) for problem in problems]),
+        before=rest_errors(problems),
         errors=rest_errors([problem.of_robot(found) for problem in problems]),
         iterations=iterations,
         cost=solution.cost,
