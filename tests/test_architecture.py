@@ -20,7 +20,8 @@ factors
 graphs.kernels graphs.problem graphs.solving graphs.workers graphs.spread graphs.gtsam_solvers graphs.noise
 graphs.starts graphs.screening graphs.locked_springs graphs.scoring.columns
 graphs.scoring graphs.scoring.regression graphs.calibration.stages graphs.calibration
-graphs.responses graphs.frequency graphs.rests graphs.rest_search graphs.poses graphs.joint_kinds
+graphs.responses graphs.frequency graphs.rest_sets graphs.rests graphs.rest_search graphs.poses
+graphs.joint_kinds
 graphs.comparison graphs.refits graphs.judging graphs.discovery graphs.across_kinds graphs.transmission
 graphs.fixed_lag.window
 graphs.fixed_lag.messages graphs.fixed_lag graphs.fixed_lag.replay

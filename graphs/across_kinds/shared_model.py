@@ -20,8 +20,8 @@ from jointscope.graphs.poses.calibrate_poses import PoseCalibration, calibrate_p
 from jointscope.graphs.poses.tip_errors import whitened
 from jointscope.graphs.poses.tracker_start import placed
 from jointscope.graphs.refits.validation import fit_and_judge, judged_error, reported_heldout_error
-from jointscope.graphs.rests.rest_errors import rest_errors
-from jointscope.graphs.rests.rest_set import RestSet
+from jointscope.graphs.rest_sets.rest_errors import rest_errors
+from jointscope.graphs.rest_sets.rest_set import RestSet
 from jointscope.graphs.rests.rests_beside_motion import weighted_rests, with_rests
 from jointscope.graphs.solving.batch_solver import Progress, Solver, solve
 from jointscope.graphs.solving.set_problem import SetProblem

@@ -15,8 +15,8 @@ from jointscope.graphs.frequency.frequency_summary import FrequencySummary
 from jointscope.graphs.joint_kinds.beside_motion import moved, summary_at
 from jointscope.graphs.joint_kinds.calibrate_kinds import KindsCalibration
 from jointscope.graphs.poses.calibrate_poses import PoseCalibration, calibrate_poses
+from jointscope.graphs.rest_sets.rest_set import RestSet
 from jointscope.graphs.rests.calibrate_rests import MOST_ITERATIONS
-from jointscope.graphs.rests.rest_set import RestSet
 from jointscope.graphs.solving.batch_solver import Progress, Solution, solve
 from jointscope.graphs.solving.estimate import Estimate
 from jointscope.graphs.solving.posterior import posteriors

@@ -29,11 +29,11 @@ from jointscope.graphs.joint_kinds.all_kinds import (
 )
 from jointscope.graphs.joint_kinds.calibrate_kinds import KindsCalibration, calibrate_kinds
 from jointscope.graphs.poses.calibrate_poses import PoseCalibration, calibrate_poses
+from jointscope.graphs.rest_sets.rest_errors import rest_errors
+from jointscope.graphs.rest_sets.rest_set import RestSet
 from jointscope.graphs.rests.band_posterior import band_posterior
 from jointscope.graphs.rests.calibrate_rests import RestCalibration, calibrate_rests, check_bands
 from jointscope.graphs.rests.doubts import AskedOfRests
-from jointscope.graphs.rests.rest_errors import rest_errors
-from jointscope.graphs.rests.rest_set import RestSet
 from jointscope.graphs.rests.rests_by_values import SaidElsewhere
 from jointscope.graphs.rests.unnoticed import unnoticed
 from jointscope.graphs.solving.batch_solver import Progress, Solution

@@ -35,7 +35,7 @@ from jointscope.graphs.poses.trimmed_poses import (
 )
 from jointscope.graphs.poses.two_noises import noise_ratios
 from jointscope.graphs.poses.what_moved import what_moved
-from jointscope.graphs.rests.independent_states import reduced
+from jointscope.graphs.rest_sets.independent_states import reduced
 from jointscope.graphs.solving.batch_solver import Progress, solve
 from jointscope.graphs.solving.estimate import Estimate
 from jointscope.graphs.solving.posterior import posteriors

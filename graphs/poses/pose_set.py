@@ -21,7 +21,7 @@ from jointscope.factors.block import POINT, POSE3, Block
 from jointscope.factors.calibration import DYNAMICS, Calibration
 from jointscope.graphs.poses.sagging_arm import SaggingArm, SaggingPoint, in_tracker
 from jointscope.graphs.poses.seen_targets import SeenTargets
-from jointscope.graphs.rests.independent_states import of_independent_states
+from jointscope.graphs.rest_sets.independent_states import of_independent_states
 from jointscope.graphs.solving.normal_equations import NormalEquations
 from jointscope.robots.geometry.rotations import log_slopes
 from jointscope.robots.model.robot import Robot

@@ -13,9 +13,9 @@ from numpy.typing import NDArray
 from jointscope.factors.calibration import DYNAMICS, Calibration
 from jointscope.graphs.rest_search.rest_fits import fit_rests, folds_of
 from jointscope.graphs.rest_search.rest_judge import Judged, RestCandidate, judge_rests
+from jointscope.graphs.rest_sets.rest_errors import RestErrors, rest_errors
+from jointscope.graphs.rest_sets.rest_set import RestSet
 from jointscope.graphs.rests.calibrate_rests import RestCalibration, calibrate_rests
-from jointscope.graphs.rests.rest_errors import RestErrors, rest_errors
-from jointscope.graphs.rests.rest_set import RestSet
 from jointscope.graphs.solving.solver_context import in_solver_context
 from jointscope.robots.errors import RecordingError
 from jointscope.robots.model.robot import Robot

@@ -23,8 +23,8 @@ from numpy.typing import NDArray
 from jointscope.factors.calibration import DYNAMICS, Calibration
 from jointscope.graphs.calibration.found_values import derived_value
 from jointscope.graphs.rest_search.rest_candidates import candidate_rows, loads_tried, postures, rounded
+from jointscope.graphs.rest_sets.rest_set import RestSet
 from jointscope.graphs.rests.calibrate_rests import RestCalibration
-from jointscope.graphs.rests.rest_set import RestSet
 from jointscope.graphs.rests.taken_for_granted import unsure
 from jointscope.robots.parts.relative_sigma import KNOWN
 

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from jointscope.factors.calibration import Calibration
-from jointscope.graphs.rests.rest_set import RestSet
+from jointscope.graphs.rest_sets.rest_set import RestSet
 from jointscope.robots.dynamics.transmission import motor_angles
 from jointscope.robots.effect_kinds.joint_torque import JointTorque
 from jointscope.robots.rests.rests import Rests

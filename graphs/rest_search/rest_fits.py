@@ -15,8 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from jointscope.factors.calibration import Calibration
-from jointscope.graphs.rests.rest_set import EDGE, RestSet
-from jointscope.graphs.rests.settling import settled
+from jointscope.graphs.rest_sets.rest_set import EDGE, RestSet
+from jointscope.graphs.rest_sets.settling import settled
 from jointscope.graphs.solving.batch_solver import solve
 from jointscope.graphs.solving.estimate import Estimate
 from jointscope.graphs.solving.whole_set import WholeSet

@@ -16,8 +16,8 @@ from numpy.typing import NDArray
 from jointscope.factors.calibration import DYNAMICS, Calibration
 from jointscope.graphs.rest_search.rest_fits import Mask, RestFit, fit_rests
 from jointscope.graphs.rest_search.rest_scores import RestScore, RestScores
-from jointscope.graphs.rests.independent_states import reduced
-from jointscope.graphs.rests.rest_set import EDGE
+from jointscope.graphs.rest_sets.independent_states import reduced
+from jointscope.graphs.rest_sets.rest_set import EDGE
 from jointscope.robots.effect_kinds.joint_torque import JointTorque
 from jointscope.robots.errors import SolveError
 from jointscope.robots.files.effect_editing import add_effect, remove_effect

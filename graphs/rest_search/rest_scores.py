@@ -20,9 +20,9 @@ from scipy.special import chdtrc
 
 from jointscope.factors.calibration import DYNAMICS, Calibration
 from jointscope.graphs.rest_search.rest_hypotheses import batches
-from jointscope.graphs.rests.independent_states import reduced
+from jointscope.graphs.rest_sets.independent_states import reduced
+from jointscope.graphs.rest_sets.rest_set import RestSet
 from jointscope.graphs.rests.linear_rests import LinearRests
-from jointscope.graphs.rests.rest_set import RestSet
 from jointscope.graphs.rests.taken_for_granted import at_null
 from jointscope.graphs.scoring.columns.hypotheses import EffectHypothesis
 from jointscope.graphs.scoring.hypothesis_score import HypothesisScore, JointScores

@@ -23,8 +23,8 @@ from scipy.special import expit
 
 from jointscope.factors.calibration import DYNAMICS, Calibration
 from jointscope.factors.friction_band import band_cost, piled_cost
+from jointscope.graphs.rest_sets.rest_set import EDGE, RestSet
 from jointscope.graphs.rests.linear_rests import LinearRests
-from jointscope.graphs.rests.rest_set import EDGE, RestSet
 from jointscope.graphs.rests.rests_by_values import RestsByValues, SaidElsewhere
 from jointscope.graphs.rests.taken_for_granted import unsure
 from jointscope.graphs.rests.walkers import moments
@@ -222,7 +222,8 @@ class MotorBands:
         rest = rng.uniform(low, high, (WALKERS, len(low)))
 
         def cost(point: Array) -> Array:
-            return self.cost(point[:, :r], *point[:, r:].T, slope)
+            odds, depth, blur, taken = point[:, r:].T
+            return self.cost(point[:, :r], odds, depth, blur, taken, slope)
 
         for _ in range(MOST_SHRINKS):
             lost = ~np.isfinite(cost(np.hstack([z, rest])))

@@ -17,13 +17,13 @@ from numpy.typing import NDArray
 from jointscope.factors.calibration import DYNAMICS, Calibration
 from jointscope.graphs.calibration.calibration_result import ParameterEstimate
 from jointscope.graphs.calibration.found_values import derived_results, dynamic_parameters
+from jointscope.graphs.rest_sets.rest_errors import RestErrors, rest_errors
+from jointscope.graphs.rest_sets.rest_set import EDGE, RestSet
+from jointscope.graphs.rest_sets.settling import settled
 from jointscope.graphs.rests.band_posterior import band_posterior
 from jointscope.graphs.rests.doubts import AskedOfRests, Doubt
-from jointscope.graphs.rests.rest_errors import RestErrors, rest_errors
-from jointscope.graphs.rests.rest_set import EDGE, RestSet
 from jointscope.graphs.rests.rests_by_values import SaidElsewhere
 from jointscope.graphs.rests.seen_rests import SeenRests
-from jointscope.graphs.rests.settling import settled
 from jointscope.graphs.rests.unheard_speeds import as_given, with_priors, without_motion
 from jointscope.graphs.rests.unnoticed import Unnoticed, unnoticed
 from jointscope.graphs.solving.batch_solver import Progress, Solution, solve

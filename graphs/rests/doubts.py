@@ -19,8 +19,8 @@ from numpy.typing import NDArray
 from scipy.special import betainc
 
 from jointscope.factors.calibration import Calibration
+from jointscope.graphs.rest_sets.rest_set import RestSet
 from jointscope.graphs.rests.linear_rests import LinearRests
-from jointscope.graphs.rests.rest_set import RestSet
 from jointscope.graphs.rests.rests_by_values import RestsByValues, SaidElsewhere
 from jointscope.graphs.rests.taken_for_granted import all_rigid, at_null
 from jointscope.graphs.scoring.columns.hypotheses import EffectHypothesis, hypotheses_of

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from jointscope.factors.calibration import Calibration
 from jointscope.factors.friction_band import band_cost
-from jointscope.graphs.rests.rest_set import EDGE, RestSet
+from jointscope.graphs.rest_sets.rest_set import EDGE, RestSet
 
 Array = NDArray[np.float64]
 Columns = NDArray[np.intp]

@@ -15,11 +15,11 @@ import numpy as np
 from jointscope.factors.calibration import DYNAMICS
 from jointscope.graphs.calibration.calibration_result import CalibrationResult
 from jointscope.graphs.calibration.found_values import AT_BOUND, derived_results
+from jointscope.graphs.rest_sets.rest_errors import rest_errors
+from jointscope.graphs.rest_sets.rest_set import RestSet
 from jointscope.graphs.rests.band_posterior import band_posterior
 from jointscope.graphs.rests.calibrate_rests import settled_rests
 from jointscope.graphs.rests.doubts import AskedOfRests
-from jointscope.graphs.rests.rest_errors import rest_errors
-from jointscope.graphs.rests.rest_set import RestSet
 from jointscope.graphs.rests.rests_by_values import SaidElsewhere
 from jointscope.graphs.rests.seen_rests import SeenRests
 from jointscope.graphs.solving.batch_solver import Progress

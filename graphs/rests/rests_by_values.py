@@ -13,9 +13,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from jointscope.factors.calibration import DYNAMICS, Calibration
-from jointscope.graphs.rests.independent_states import reduced
+from jointscope.graphs.rest_sets.independent_states import reduced
+from jointscope.graphs.rest_sets.rest_set import RestSet
 from jointscope.graphs.rests.linear_rests import LinearRests
-from jointscope.graphs.rests.rest_set import RestSet
 from jointscope.robots.model.robot import Robot
 
 Array = NDArray[np.float64]

@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from jointscope.graphs.rest_sets.rest_errors import RestErrors
+from jointscope.graphs.rest_sets.rest_set import RestSet
 from jointscope.graphs.rests.doubts import Doubt
-from jointscope.graphs.rests.rest_errors import RestErrors
-from jointscope.graphs.rests.rest_set import RestSet
 from jointscope.graphs.rests.unnoticed import Unnoticed
 from jointscope.robots.model.robot import Robot
 

@@ -7,9 +7,9 @@ from collections.abc import Mapping, Sequence
 
 from jointscope.graphs.calibration.calibration_result import CalibrationResult, ParameterEstimate
 from jointscope.graphs.rest_search.next_rest import NextRest
+from jointscope.graphs.rest_sets.rest_errors import RestErrors, rest_errors
+from jointscope.graphs.rest_sets.rest_set import RestSet
 from jointscope.graphs.rests.calibrate_rests import RestCalibration
-from jointscope.graphs.rests.rest_errors import RestErrors, rest_errors
-from jointscope.graphs.rests.rest_set import RestSet
 from jointscope.robots.model.robot import Robot
 from jointscope.tools.bags.clocks.durations import counted
 from jointscope.tools.presentation.next_rest_text import next_rest_sentence

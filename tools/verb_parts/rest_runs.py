@@ -202,8 +202,8 @@ def _with_rests_json(result: Any) -> dict[str, Any]:
 
 def compare_rests(robots: Mapping[str, Robot], paths: Sequence[Path], progress: Progress) -> tuple[str, dict[str, Any]]:
     """Errors of some models on rests, for the screen and for JSON."""
-    from jointscope.graphs.rests.rest_errors import rest_errors
-    from jointscope.graphs.rests.rest_set import RestSet
+    from jointscope.graphs.rest_sets.rest_errors import rest_errors
+    from jointscope.graphs.rest_sets.rest_set import RestSet
     from jointscope.tools.terminal.rests_text import rest_errors_text
 
     by_label, content, count, recordings = {}, {}, 0, list[Rests]()

@@ -23,7 +23,7 @@ from jointscope.graphs.frequency.calibrate_frequency import calibrate_frequency
 from jointscope.graphs.joint_kinds.motion_summary import MotionSummary
 from jointscope.graphs.poses.calibrate_poses import calibrate_poses
 from jointscope.graphs.poses.tracker_start import placed
-from jointscope.graphs.rests.rest_set import RestSet
+from jointscope.graphs.rest_sets.rest_set import RestSet
 from jointscope.robots.files.effect_editing import add_effect
 from jointscope.robots.geometry.added_effect import with_effect
 from jointscope.robots.geometry.arm_effects import hypotheses

@@ -21,7 +21,7 @@ from jointscope.graphs.poses.tip_errors import tip_errors
 from jointscope.graphs.poses.tracker_start import placed
 from jointscope.graphs.poses.trimmed_poses import with_fitted
 from jointscope.graphs.poses.what_moved import what_moved
-from jointscope.graphs.rests.independent_states import reduced
+from jointscope.graphs.rest_sets.independent_states import reduced
 from jointscope.graphs.solving.batch_solver import solve
 from jointscope.robots.errors import RecordingError, SolveError
 from jointscope.robots.files.robot_file import load_robot

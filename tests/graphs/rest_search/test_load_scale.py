@@ -12,7 +12,7 @@ from lever_bench import C0, hanging, lever
 
 from jointscope.factors.calibration import Calibration
 from jointscope.graphs.rest_search.discover_rests import diagnose_rests, discover_rests
-from jointscope.graphs.rests.rest_set import RestSet
+from jointscope.graphs.rest_sets.rest_set import RestSet
 from jointscope.robots.files.effect_editing import add_effect
 from jointscope.tools.terminal.searches.rest_search_text import headline
 

@@ -14,8 +14,8 @@ from two_levers import BETA2, hardly_raised, resting_at, two_levers
 from jointscope.factors.calibration import DYNAMICS, Calibration
 from jointscope.graphs.rest_search.next_rest import next_rests
 from jointscope.graphs.rest_search.rest_candidates import candidate_rows
+from jointscope.graphs.rest_sets.rest_set import RestSet
 from jointscope.graphs.rests.calibrate_rests import calibrate_rests
-from jointscope.graphs.rests.rest_set import RestSet
 from jointscope.graphs.starts.spring_knots import with_knots
 from jointscope.robots.files.effect_editing import add_effect, remove_effect
 from jointscope.tools.presentation.next_rest_text import next_rest_sentence

@@ -13,7 +13,7 @@ from scipy.interpolate import PchipInterpolator
 from scipy.optimize import brentq
 
 from jointscope.graphs.rest_search.discover_rests import discover_rests
-from jointscope.graphs.rests.rest_curves import spring_curves
+from jointscope.graphs.rest_sets.rest_curves import spring_curves
 from jointscope.robots.files.effect_editing import remove_effect
 from jointscope.robots.rests.rests import Rests
 from jointscope.tools.report.sections.calibration.rest_pictures import rest_pictures

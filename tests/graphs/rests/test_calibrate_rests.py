@@ -10,9 +10,9 @@ import pytest
 from lever_bench import C0, C1, K2, K3, K, hanging, lever
 
 from jointscope.factors.calibration import DYNAMICS, Calibration
+from jointscope.graphs.rest_sets.rest_errors import rest_errors
+from jointscope.graphs.rest_sets.rest_set import RestSet
 from jointscope.graphs.rests.calibrate_rests import calibrate_rests, check_bands
-from jointscope.graphs.rests.rest_errors import rest_errors
-from jointscope.graphs.rests.rest_set import RestSet
 from jointscope.robots.errors import SolveError
 from jointscope.robots.files.effect_editing import add_effect
 from jointscope.robots.files.robot_file import load_robot

@@ -9,9 +9,9 @@ from collections.abc import Sequence
 import numpy as np
 
 from jointscope.graphs.calibration.calibration_result import ParameterEstimate
+from jointscope.graphs.rest_sets.rest_errors import SURELY
 from jointscope.graphs.rests.calibrate_rests import RestCalibration
 from jointscope.graphs.rests.doubts import PLACE, Doubt
-from jointscope.graphs.rests.rest_errors import SURELY
 from jointscope.graphs.rests.seen_rests import SeenRests
 from jointscope.graphs.rests.taken_for_granted import all_rigid
 from jointscope.robots.model.command_words import bag_arguments, robot_argument

@@ -6,8 +6,8 @@ from __future__ import annotations
 import numpy as np
 
 from jointscope.graphs.calibration.calibration_result import CalibrationResult
-from jointscope.graphs.rests.rest_curves import MeasuredCurve, friction_curves, spring_curves
-from jointscope.graphs.rests.rest_set import RestSet
+from jointscope.graphs.rest_sets.rest_curves import MeasuredCurve, friction_curves, spring_curves
+from jointscope.graphs.rest_sets.rest_set import RestSet
 from jointscope.tools.report.page.page import Key, Section, figure
 from jointscope.tools.report.page.plot import Axes, Band, Curve, Mark, plot
 

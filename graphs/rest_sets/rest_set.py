@@ -20,8 +20,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from jointscope.factors.calibration import DYNAMICS, Calibration
-from jointscope.graphs.rests.independent_states import of_independent_states
-from jointscope.graphs.rests.rest_bands import RestBands, Rows, largest_held
+from jointscope.graphs.rest_sets.independent_states import of_independent_states
+from jointscope.graphs.rest_sets.rest_bands import RestBands, Rows, largest_held
 from jointscope.graphs.solving.normal_equations import NormalEquations
 from jointscope.graphs.solving.whole_set import WholeSet
 from jointscope.robots.bodies.known_loads import known_loads

@@ -23,7 +23,7 @@ from jointscope.robots.dynamics.at_rest import AtRest, WithSlopes
 from jointscope.robots.dynamics.transmission import joint_angles, motor_angles
 
 if TYPE_CHECKING:
-    from jointscope.graphs.rests.rest_set import RestSet
+    from jointscope.graphs.rest_sets.rest_set import RestSet
 
 Array = NDArray[np.float64]
 Rows = tuple[Array, Array, Array]

@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from jointscope.graphs.rests.rest_set import EDGE, RestSet
+from jointscope.graphs.rest_sets.rest_set import EDGE, RestSet
 from jointscope.graphs.solving.batch_solver import Solution, solve
 from jointscope.graphs.solving.estimate import Estimate
 from jointscope.graphs.solving.set_problem import SetProblem

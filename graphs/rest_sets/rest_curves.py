@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from jointscope.factors.calibration import Calibration
-from jointscope.graphs.rests.rest_set import RestSet
+from jointscope.graphs.rest_sets.rest_set import RestSet
 from jointscope.robots.bodies.known_loads import KnownLoads, known_loads
 from jointscope.robots.dynamics.at_rest import WithSlopes, at_rest
 from jointscope.robots.dynamics.carried_weight import CarriedWeight

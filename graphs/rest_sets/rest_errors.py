@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from scipy.stats import f
 
 from jointscope.factors.calibration import Calibration
-from jointscope.graphs.rests.rest_set import RestSet
+from jointscope.graphs.rest_sets.rest_set import RestSet
 from jointscope.robots.model.robot import Robot
 from jointscope.robots.rests.at_encoders import encoder_errors
 
