@@ -17,6 +17,7 @@ from types import ModuleType
 from typing import TYPE_CHECKING
 
 from jointscope.robots import effects as folder
+from jointscope.robots import ready_effects
 from jointscope.robots.effect_kinds.effect import Effect
 from jointscope.robots.effect_kinds.groups import GROUPS, group_of
 from jointscope.robots.errors import EffectError
@@ -85,6 +86,8 @@ def find_effect(effect_id: str) -> Effect:
         EffectError: there is none; the message offers the nearest.
     """
     known, effect_id = catalogue(), without_alias(effect_id)
+    if effect_id in _of_ready_robots():
+        return _of_ready_robots()[effect_id]
     if effect_id not in known:
         hint = did_you_mean(effect_id, list(known))
         if "did you mean" not in hint:
@@ -127,7 +130,18 @@ def parse_effect(text: str, robot: Robot) -> tuple[Effect, str]:
 @cache
 def _own() -> dict[str, Effect]:
     """The effects of this package; a broken file here is a bug."""
-    modules = (importlib.import_module(f"{folder.__name__}.{m.name}") for m in pkgutil.iter_modules(folder.__path__))
+    return _of_folder(folder)
+
+
+@cache
+def _of_ready_robots() -> dict[str, Effect]:
+    """Effects that a ready robot alone has."""
+    return _of_folder(ready_effects)
+
+
+def _of_folder(package: ModuleType) -> dict[str, Effect]:
+    """The effects of all modules of a package."""
+    modules = (importlib.import_module(f"{package.__name__}.{m.name}") for m in pkgutil.iter_modules(package.__path__))
     families = (getattr(module, "EFFECTS", None) or (module.EFFECT,) for module in modules)
     return {effect.id: effect for family in families for effect in family}
 

@@ -15,7 +15,7 @@ from jointscope.robots.files.robot_file import load_robot
 from jointscope.robots.model.robot import Robot
 from jointscope.robots.recordings.recording import Recording
 from jointscope.tools.acceptance.limits import Limit, check_units, read_limits
-from jointscope.tools.bags.read_recording import read_recording
+from jointscope.tools.bags.read_motion import read_motion
 from jointscope.tools.presentation.left_out import leave_out as leave_out_texts
 from jointscope.tools.simulator.simulation import Simulation
 
@@ -45,7 +45,7 @@ def recording_of(recording: AnyRecording, robot: Robot) -> Recording:
         RecordingError: a bag cannot be read, or something is no recording.
     """
     if isinstance(recording, str | Path):
-        return read_recording(recording, robot)
+        return read_motion(recording, robot)
     given = recording.recording if isinstance(recording, Simulation) else recording
     if not isinstance(given, Recording):
         raise RecordingError(f"expected a recording, the result of simulate, or a path, got {_told(recording)}")

@@ -12,7 +12,7 @@ from jointscope.graphs.fixed_lag.replay.replay import SMOOTHED_EVERY
 from jointscope.graphs.fixed_lag.replay.replay import replay as replay_messages
 from jointscope.robots.recordings.recording import Recording
 from jointscope.tools.bags.read_arrivals import ArrivalReader
-from jointscope.tools.bags.read_recording import read_recording
+from jointscope.tools.bags.read_motion import read_motion
 from jointscope.tools.bags.write_bag import write_bag
 from jointscope.tools.notebook.given import AnyRecording, AnyRobot, recording_of, robot_of
 from jointscope.tools.notebook.results import Replayed, Simulated
@@ -31,7 +31,7 @@ def read(bag: str | Path, robot: AnyRobot, *, leave_out: Sequence[tuple[float, f
     Raises:
         RecordingError: the bag cannot be read, or does not hold what the robot needs.
     """
-    recording = read_recording(bag, robot_of(robot))
+    recording = read_motion(bag, robot_of(robot))
     return recording.leaving_out(leave_out) if leave_out else recording
 
 

@@ -130,14 +130,14 @@ def read_bags(args: argparse.Namespace, robot: Robot, progress: Progress) -> tup
 
 def _read(args: argparse.Namespace, robot: Robot, progress: Progress) -> tuple[list[Recording], Recording | None]:
     """What the arguments name; arguments as in `read_bags`."""
-    from jointscope.tools.bags.read_recording import read_recording
+    from jointscope.tools.bags.read_motion import read_motion
 
-    recordings = [read_recording(bag, robot, reading(bag, progress)) for bag in args.bags]
+    recordings = [read_motion(bag, robot, reading(bag, progress)) for bag in args.bags]
     if args.holdout_share is not None:
         return _last_part_held_out(args, leave_out(recordings, args.leave_out))
     if args.holdout is None:
         return leave_out(recordings, args.leave_out), None
-    holdout = read_recording(args.holdout, robot, reading(args.holdout, progress))
+    holdout = read_motion(args.holdout, robot, reading(args.holdout, progress))
     _check_apart(recordings, holdout)
     *recordings, holdout = leave_out([*recordings, holdout], args.leave_out)
     return recordings, holdout

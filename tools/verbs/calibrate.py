@@ -92,7 +92,7 @@ def run(args: argparse.Namespace) -> int:
     )
     from jointscope.robots.files.robot_file import load_robot
     from jointscope.robots.model.command_words import bag_arguments
-    from jointscope.tools.bags.read_recording import read_recording
+    from jointscope.tools.bags.read_motion import read_motion
     from jointscope.tools.notebook.calls import calibrate
     from jointscope.tools.terminal.calibration_text import calibration_text
     from jointscope.tools.verb_parts.first_look import first_look
@@ -117,7 +117,7 @@ def run(args: argparse.Namespace) -> int:
             f"`{'--incremental' if args.incremental else '--solver samples'}`"
         )
     with progress_bar() as progress, workers_of(args) as workers:
-        read = [read_recording(bag, robot, reading(bag, progress)) for bag in args.bags]
+        read = [read_motion(bag, robot, reading(bag, progress)) for bag in args.bags]
         recordings = leave_out(read, args.leave_out)
         first_look(robot, recordings)
         check_workers(workers, robot, recordings)

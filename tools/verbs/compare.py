@@ -72,7 +72,7 @@ def run(args: argparse.Namespace) -> int:
     check_outputs(files.all, inputs=[*([] if still else [args.bag]), *still, *robot_files, *args.effects])
     from jointscope.robots.files.robot_file import load_robot
     from jointscope.tools.bags.needed_streams import check_same_streams
-    from jointscope.tools.bags.read_recording import read_recording
+    from jointscope.tools.bags.read_motion import read_motion
     from jointscope.tools.notebook.calls import compare
     from jointscope.tools.terminal.comparison_text import comparison_text
 
@@ -90,7 +90,7 @@ def run(args: argparse.Namespace) -> int:
         check_viewer(robot, files)
     with progress_bar() as progress:
         first = next(iter(robots.values()))
-        (recording,) = leave_out([read_recording(args.bag, first, reading(args.bag, progress))], args.leave_out)
+        (recording,) = leave_out([read_motion(args.bag, first, reading(args.bag, progress))], args.leave_out)
         result = compare(robots, recording, accept=limits, progress=progress)
         result.write(files)
     print(comparison_text(result))

@@ -19,10 +19,8 @@ from jointscope.robots.rests.load_history import LoadHistory
 from jointscope.robots.rests.rests import Rests, find_rests
 from jointscope.tools.bags.at_poses.load_table import check_loads, loads_beside, loads_from_table
 from jointscope.tools.bags.messages.open_bag import open_bag
+from jointscope.tools.bags.read_motion import LOAD, LOAD_TYPE
 from jointscope.tools.bags.read_recording import read_recording
-
-LOAD = "/load"
-LOAD_TYPE = "geometry_msgs/msg/WrenchStamped"
 
 
 def read_rests(path: str | Path, robot: Robot) -> Rests:
