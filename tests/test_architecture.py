@@ -13,8 +13,8 @@ ROOT = Path(__file__).resolve().parents[1]
 FLOORS = ("robots", "factors", "graphs", "tools")
 MODULES = sorted(path for floor in FLOORS for path in (ROOT / floor).rglob("*.py"))
 ROOMS = """
-robots robots.urdf robots.bodies robots.parts robots.effect_kinds robots.model robots.geometry robots.effects robots.ready_effects
-robots.dynamics robots.recordings robots.rests robots.files.sections robots.files
+robots robots.urdf robots.bodies robots.parts robots.effect_kinds robots.model robots.geometry robots.effects
+robots.ready_effects robots.dynamics robots.recordings robots.rests robots.files.sections robots.files
 robots.ready
 factors
 graphs.kernels graphs.problem graphs.solving graphs.workers graphs.spread graphs.gtsam_solvers graphs.noise

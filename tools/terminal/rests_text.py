@@ -11,11 +11,14 @@ from jointscope.graphs.rest_sets.rest_errors import RestErrors, rest_errors
 from jointscope.graphs.rest_sets.rest_set import RestSet
 from jointscope.graphs.rests.calibrate_rests import RestCalibration
 from jointscope.robots.model.robot import Robot
+from jointscope.robots.rests.rests import Rests
 from jointscope.tools.bags.clocks.durations import counted
 from jointscope.tools.presentation.next_rest_text import next_rest_sentence
 from jointscope.tools.presentation.numbers import significant, with_sigma
 from jointscope.tools.terminal.text_table import text_table
 from jointscope.tools.verdicts.rests.rest_verdict import verdict
+
+SLIGHTLY = 1.2  # times that a sigma may be widened without a word
 
 
 def rest_calibration_text(result: RestCalibration, beside: bool = False, advice: Sequence[NextRest] = ()) -> str:
@@ -33,17 +36,34 @@ def rest_calibration_text(result: RestCalibration, beside: bool = False, advice:
         "",
         f"{'As far as the rests say: ' * beside}{verdict(result)}",
         f"  - links rest {significant(result.errors.error, 2)} sigma (rms) from where motors and loads put them, "
-        f"{significant(result.before.error, 3)} before; 1 is expected",
+        f"{significant(result.before.error, 3)} before; 1 is expected{_widened(result)}",
     ]
-    lines += [f"  - {notice.text}" for problem in result.problems for notice in problem.rests.notices]
-    table = text_table(
-        ["parameter", "start", "value", "± sigma", "unit", ""],
-        [_row(p) for p in (*result.parameters, *result.derived)],
-        "<>>><<",
-    )
+    lines += rest_notices([problem.rests for problem in result.problems])
+    table = rest_values(result)
     silent = f"\n\nThe rests say nothing about {', '.join(result.silent)}." if result.silent else ""
     silent += "".join(f"\n{line}" for line in _advised(result, advice))
     return "\n".join(lines) + f"\n\n{table}{silent}\n\n{_errors({result.robot.name: result.errors}, result.robot)}"
+
+
+def rest_values(result: RestCalibration) -> str:
+    """The table of what was found."""
+    rows = [_row(p) for p in (*result.parameters, *result.derived)]
+    return text_table(["parameter", "start", "value", "± sigma", "unit", ""], rows, "<>>><<")
+
+
+def rest_notices(recordings: Sequence[Rests]) -> list[str]:
+    """What was odd about rests, of each recording with its name where there are several."""
+    several = len(recordings) > 1
+    return [f"  - {f'{rests.path}: ' * several}{notice.text}" for rests in recordings for notice in rests.notices]
+
+
+def _widened(result: RestCalibration) -> str:
+    """That sigmas of link encoders were widened until one is what comes out; empty where they were not."""
+    scale = result.problems[0].repeatability
+    j = int(scale.argmax())
+    if scale[j] < SLIGHTLY:
+        return ""
+    return f"; the sigma of {result.robot.joints[j]}'s link encoder was widened {significant(float(scale[j]), 2)} times"
 
 
 def _advised(result: RestCalibration, advice: Sequence[NextRest]) -> list[str]:

@@ -196,3 +196,14 @@ def test_loads_on_another_clock_than_the_encoders_are_refused(times, said):
 def test_a_load_that_was_said_before_the_recording_hangs_there(times):
     forces = np.arange(3.0 * len(times)).reshape(-1, 3)
     _must_be_of(Path("bench"), lasting(10.0), LoadHistory(np.array(times), forces, ("hook",) * len(times)))
+
+
+@needs_biorob
+def test_a_coupling_of_the_wrong_sign_is_named_beside_the_rests(tmp_path):
+    text = ROBOT.path.read_text(encoding="utf-8").replace("joint3: 0.0120", "joint3: -0.0120")
+    text = text.replace("urdf: biorob.urdf", f"urdf: {ROBOT.path.with_name('biorob.urdf')}")
+    (tmp_path / "mirrored.yaml").write_text(text, encoding="utf-8")
+    bag = DATA / "static_gravity" / "gravity"
+    said = [notice.text for notice in read_rests(bag, load_robot(tmp_path / "mirrored.yaml")).notices]
+    assert any("wrong sign in row 4, column 3" in text for text in said)
+    assert not any("transmission" in notice.text for notice in read_rests(bag, ROBOT).notices)

@@ -11,6 +11,7 @@ from pathlib import Path
 
 import numpy as np
 
+from jointscope.graphs.screening.mistaken_transmission import mistaken_transmission
 from jointscope.robots.errors import RecordingError
 from jointscope.robots.model.robot import Robot
 from jointscope.robots.recordings.recording import Notice, Recording
@@ -37,15 +38,19 @@ def read_rests(path: str | Path, robot: Robot) -> Rests:
     robot.need_link_dynamics()
     recording = read_recording(path, robot)
     check_angle_units(recording, robot)
+    mistake = mistaken_transmission(recording, robot)
+    odd = () if mistake is None else (Notice("transmission", "info", 0, mistake.sentence(robot)),)
     table = loads_beside(Path(path))
     found = _loads(Path(path), robot, recording)
     if not table.is_file():
-        return find_rests(recording, robot, found or LoadHistory.none())
+        rests = find_rests(recording, robot, found or LoadHistory.none())
+        return replace(rests, notices=(*rests.notices, *odd))
     if found is not None:
         raise RecordingError(f"{path}: has the topic {LOAD}, and {table} says loads, too; remove the one that is wrong")
     _must_have_one_clock(Path(path), recording)
     rests = find_rests(recording, robot, loads_from_table(table, robot, recording))
-    return replace(rests, notices=(*rests.notices, Notice("load", "info", len(rests), f"Loads are those of {table}.")))
+    told = Notice("load", "info", len(rests), f"Loads are those of {table}.")
+    return replace(rests, notices=(*rests.notices, *odd, told))
 
 
 def _loads(path: Path, robot: Robot, recording: Recording) -> LoadHistory | None:

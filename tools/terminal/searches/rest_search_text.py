@@ -8,6 +8,7 @@ from collections.abc import Sequence
 from jointscope.graphs.rest_search.discover_rests import RestDiscovery
 from jointscope.graphs.rest_search.rest_judge import RestCandidate
 from jointscope.tools.presentation.numbers import fall_text, significant, with_sigma
+from jointscope.tools.terminal.rests_text import rest_notices, rest_values
 from jointscope.tools.terminal.text_table import text_table
 
 SHOWN = 8
@@ -18,12 +19,14 @@ MOST_NAMES = 4  # look-alikes that are named in a row
 def rest_search_text(found: RestDiscovery) -> str:
     """The steps, and what was looked at last; of a diagnosis the one model and what it lacks."""
     head, rows = step_table(found)
-    notices = [f"  - {notice.text}" for rests in (*found.recordings, *found.holdout) for notice in rests.notices]
+    notices = rest_notices([*found.recordings, *found.holdout])
     parts = ["\n".join([text_table(head, rows, "<<" + ">" * (len(head) - 2)), *notices])]
     if found.stop_reason:
         parts.append(f"The search ended because {found.stop_reason}.")
     parts += [f"{step.added.label}: {sizes_said(step.added)}{_alike(step.added)}" for step in found.steps if step.added]
-    return "\n\n".join([*parts, headline(found), ranking_text(found), *untestable_said(found.candidates)])
+    values = [rest_values(found.steps[-1].result)] if found.stop_reason else []
+    ends = [headline(found), *values, ranking_text(found), *untestable_said(found.candidates)]
+    return "\n\n".join([*parts, *ends])
 
 
 def step_table(found: RestDiscovery) -> tuple[list[str], list[list[str]]]:
