@@ -71,16 +71,15 @@ def band_cost(y: Array, half: Array, sigma: Array) -> BandCost:
     return BandCost(cost, by_torque, by_half, np.exp(of_y) / sigma**2, np.exp(of_s) / sigma**2, curvature)
 
 
-def piled_cost(y: Array, half: Array, sigma: Array, share: Array, depth: Array, gap: Array | float = 0.0) -> Array:
+def piled_cost(y: Array, half: Array, sigma: Array, share: Array, depth: Array) -> Array:
     """The cost alone, where a share w of the torques lies in piles below the edges of the band.
 
     A motor that slid to where it rests had all of its friction, and lost little of it since; one whose torque changed
     afterwards has any. Piles reach down from the edges by a part h of s, and are even: what lies deep in them may not
-    push the edge beyond the largest torques. A link that still swung took a gap g off all that its motor's friction
-    could hold.
+    push the edge beyond the largest torques.
 
         L = (1 - w) (Phi((y + s) / sigma) - Phi((y - s) / sigma)) / (2 s) + w (E(s - y) + E(s + y)) / 2
-        E(d) = (Phi((d - g) / sigma) - Phi((d - g - h s) / sigma)) / (h s)
+        E(d) = (Phi(d / sigma) - Phi((d - h s) / sigma)) / (h s)
 
     Args:
         y: torques less the middle of their bands, shape (k, m) [N m].
@@ -88,7 +87,6 @@ def piled_cost(y: Array, half: Array, sigma: Array, share: Array, depth: Array, 
         sigma: noise of the torques, shape (m,) [N m].
         share: w, between 0 and 1, shape (k,).
         depth: h, between 0 and 1, shape (k,).
-        gap: g, shape (k, m) [N m]; piles reach no further than the middle of the band.
 
     Returns:
         Shape (k, m).
@@ -96,12 +94,11 @@ def piled_cost(y: Array, half: Array, sigma: Array, share: Array, depth: Array, 
     half, sigma = np.broadcast_to(half, y.shape), np.broadcast_to(sigma, y.shape)
     deep = depth[:, None] * half
     below = (half - np.abs(y)) / sigma
-    in_pile = below - np.minimum(gap, half - deep) / sigma
     spread, pile = np.log(0.5 / half), np.full_like(y, -np.inf)
     spread += np.log1p(-share)[:, None]
-    near, within = below < FAR_INSIDE, in_pile - deep / sigma < FAR_INSIDE
+    near, within = below < FAR_INSIDE, below - deep / sigma < FAR_INSIDE
     spread[near] += _log_difference(below[near], -((half + np.abs(y)) / sigma)[near])
-    of_pile = _log_difference(in_pile[within], (in_pile - deep / sigma)[within])
+    of_pile = _log_difference(below[within], (below - deep / sigma)[within])
     pile[within] = of_pile + (np.log(0.5 * share)[:, None] - np.log(deep))[within]
     return np.asarray(-np.logaddexp(spread, pile) - np.log(sigma) - 0.5 * LOG_2PI)
 

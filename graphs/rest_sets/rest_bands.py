@@ -20,14 +20,13 @@ from numpy.typing import NDArray
 from jointscope.factors.calibration import Calibration
 from jointscope.factors.friction_band import band_cost
 from jointscope.robots.dynamics.at_rest import AtRest, WithSlopes
-from jointscope.robots.dynamics.transmission import joint_angles, motor_angles
+from jointscope.robots.dynamics.transmission import joint_angles
 
 if TYPE_CHECKING:
     from jointscope.graphs.rest_sets.rest_set import RestSet
 
 Array = NDArray[np.float64]
 Rows = tuple[Array, Array, Array]
-UNSEEN = 3.0  # [sigma] of the link encoder, of a swing that it does not show
 SMALLEST_CURVATURE = 1e-4  # of the information on y, where no edge is near
 
 
@@ -90,7 +89,7 @@ def largest_held(
     """What friction holds, half its band there, the noise that turning points add, and how much more it may have held.
 
     The last two have shape (m, n) [N m]. A period before the farthest turning point the motor slipped: friction is no
-    larger than what it would have had to hold then. Where no swing was seen there may have been one within the noise.
+    larger than what it would have had to hold then.
 
     Args:
         problem: the rests.
@@ -98,16 +97,14 @@ def largest_held(
         torques: there.
         calibration: values.
     """
-    held, half, noise = torques.held, torques.half, np.zeros_like(problem.rests.q_motor)
-    robot, layout, turns = problem.robot, problem.robot.layout, problem.rests.turned
-    if robot.link_encoder is None or not layout.motors:
-        return held, half, noise, noise
+    held, half, (noise, before) = torques.held, torques.half, np.zeros((2, *problem.rests.q_motor.shape))
+    turns, robot, layout = problem.rests.turning_points, problem.robot, problem.robot.layout
+    if turns is None:
+        return held, half, noise, before
     links = problem.places(layout.joint_q)
     own = joint_angles(robot, np.eye(robot.n))  # row j: the links, where the spring of motor j turns by one
     springs = np.array([joint in layout.motors for joint in robot.joints])
-    sigma = np.sqrt(motor_angles(robot, np.eye(robot.n)).T ** 2 @ robot.link_encoder.sigmas**2)
-    before = UNSEEN * _by_own(held, links, own) * np.where(springs, sigma, 0.0)
-    for side in (0, 1) if turns.any else ():
+    for side in (0, 1):
         there = x.copy()
         there[:, links] += np.where(springs, turns.links[:, side], 0.0)
         found = problem.torques(there, calibration, turns.commands[:, side])

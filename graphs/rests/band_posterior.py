@@ -39,6 +39,7 @@ FEW, NONE = -4.0, -14.0  # logits from where to where the share is none
 BELIEF = 10.0  # how much likelier piles must make rests to be believed as much as none
 DEPTHS = np.log((0.01, 0.5))  # of the piles below the edges, of the band; deeper ones are spread over it
 BLURS = np.log((0.1 * EDGE, EDGE))  # of the edges, of the friction
+MOST_OF_BAND = 0.5  # that a swing can have taken off
 MOST_SHRINKS = 100  # of where walkers begin, towards the likeliest values
 SMALLEST_SHARE = 0.1  # of a positive value that its mean leaves of it
 SMALLEST_INFORMATION = 1e-3  # of all together, over that without bands
@@ -120,13 +121,12 @@ def _moments(linear: LinearRests, least: Array) -> tuple[Array, Array]:
         ) from err
     motors = [MotorBands.of(linear, j, L, least) for j in np.unique(linear.motor).tolist()]
     c = L.T @ linear.b
-    pulled = c + sum((motor.slope for motor in motors), np.zeros_like(c))
     P, h = np.eye(len(c)), -c
     for motor in motors:
         V = motor.V
         h -= motor.slope - V @ (V.T @ motor.slope)
         if V.shape[1]:
-            slope = V.T @ (pulled - motor.slope)
+            slope = V.T @ c  # edges of other motors pull as far as they are blurred, and no further
             mean, covariance = motor.moments(slope)
             inverse = np.linalg.inv(covariance)
             P += V @ (inverse - np.eye(len(mean))) @ V.T
@@ -198,6 +198,7 @@ class MotorBands:
             slope: of the cost without these bands, shape (r,).
         """
         half, gain, found = self.half + z @ self.H.T, 1.0 + z @ self.G, np.full(len(z), np.inf)
+        half = half - np.minimum(taken[:, None] * self.before, MOST_OF_BAND * half)
         inside = np.all(half > 0.0, axis=1) & (gain > 0.0) & np.all(z @ self.T.T > self.least, axis=1)
         inside &= (odds < MOST_ODDS) & (odds > NONE)
         for value, (low, high) in ((depth, DEPTHS), (blur, BLURS), (taken, (0.0, 1.0))):
@@ -205,8 +206,7 @@ class MotorBands:
         if inside.any():
             z, share = z[inside], expit(odds[inside])
             sigma = np.hypot(np.exp(blur[inside])[:, None] * self.scale, self.noise)
-            gap = taken[inside, None] * self.before
-            bands = piled_cost(self.y + z @ self.Y.T, half[inside], sigma, share, np.exp(depth[inside]), gap)
+            bands = piled_cost(self.y + z @ self.Y.T, half[inside], sigma, share, np.exp(depth[inside]))
             costs = bands + np.log(sigma)  # of densities, whose blur is not the same
             costs -= np.log(gain[inside])[:, None]
             jeffreys = -0.5 * np.log(share * (1.0 - share))  # his prior of a share, on the axis of its logit

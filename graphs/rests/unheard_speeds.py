@@ -30,21 +30,17 @@ def without_motion(robot: Robot, recordings: Sequence[Rests]) -> tuple[Robot, tu
         robot: with start values.
         recordings: rests of each.
     """
-    calibration, told, moving = Calibration.of(robot), set[str](), set[str]()
-    for rests in recordings:
-        if not np.any(rests.creep):
-            continue
+    calibration = Calibration.of(robot)
+    still, sliding = np.zeros((2, len(calibration.names)))
+    for rests in recordings if any(np.any(rests.creep) for rests in recordings) else ():
         problem = RestSet.of(robot, rests)
-        x, at = problem.start(calibration)
-        torques = problem.torques(x, at)
-        for k, name in enumerate(at.names):
-            still = (torques.links, torques.motors, torques.middle, torques.half)
-            sliding = float(np.abs(torques.sliding.by_parameter[:, :, k]).max(initial=0.0))
-            if any(np.any(np.abs(part.by_parameter[:, :, k]) > NOTHING * sliding) for part in still):
-                told.add(name)
-            elif sliding > 0.0:
-                moving.add(name)
-    names = tuple(name for name in calibration.names if name in moving - told)
+        torques = problem.torques(*problem.start(calibration))
+        for part in (torques.links, torques.motors, torques.middle, torques.half):
+            still = np.maximum(still, np.abs(part.by_parameter).max(axis=(0, 1), initial=0.0))
+        creeping = torques.sliding.by_parameter[rests.creep != 0.0]
+        sliding = np.maximum(sliding, np.abs(creeping).max(axis=0, initial=0.0))
+    alone = (sliding > 0.0) & (still <= NOTHING * sliding)
+    names = tuple(name for name, each in zip(calibration.names, alone.tolist(), strict=True) if each)
     held = {name: replace(robot.parameters[name], fixed=True) for name in names}
     return replace(robot, parameters={**robot.parameters, **held}), names
 

@@ -17,7 +17,7 @@ import jointscope
 from jointscope.robots.files.robot_file import load_robot
 from jointscope.robots.model.command_words import ready_robots
 from jointscope.robots.recordings.recording import Recording, Stream
-from jointscope.tools.bags import read_recording as read_module
+from jointscope.tools.bags import read_motion as read_module
 from jointscope.tools.bags.needed_streams import needed_streams
 from jointscope.tools.bags.write_bag import write_bag
 from jointscope.tools.command_line import main, verbs
@@ -37,7 +37,7 @@ def in_own_folder(tmp_path, monkeypatch):
 @pytest.fixture
 def no_solving(monkeypatch):
     """Reading, calibrating and comparing give made-up results at once."""
-    monkeypatch.setattr(read_module, "read_recording", lambda path, robot, progress=None: fake_comparison().recording)
+    monkeypatch.setattr(read_module, "read_motion", lambda path, robot, progress=None: fake_comparison().recording)
     monkeypatch.setattr(calls, "calibrate_motion", lambda *args, **options: fake_calibration())
     monkeypatch.setattr(calls, "compare_motion", lambda *args, progress: fake_comparison())
 
@@ -240,7 +240,7 @@ BAD_OUTPUTS = [
 
 @pytest.mark.parametrize(("outputs", "told"), BAD_OUTPUTS, ids=[told[:50] for _, told in BAD_OUTPUTS])
 def test_outputs_are_checked_before_anything_is_computed(outputs, told, capsys, monkeypatch):
-    monkeypatch.setattr(read_module, "read_recording", raising(AssertionError("too early")))
+    monkeypatch.setattr(read_module, "read_motion", raising(AssertionError("too early")))
     Path("folder").mkdir()
     assert complaint(capsys, "calibrate", "doggy", "a.mcap", *outputs) == told
 

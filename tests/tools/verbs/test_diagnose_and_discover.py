@@ -12,7 +12,7 @@ from fake_diagnosis import BEARING, fake_diagnosis, fake_inputs, fake_steps
 
 from jointscope.graphs.discovery.discovery_result import Discovery
 from jointscope.robots.files.robot_file import load_robot
-from jointscope.tools.bags import read_recording as read_module
+from jointscope.tools.bags import read_motion as read_module
 from jointscope.tools.command_line import main
 from jointscope.tools.notebook import calls
 from jointscope.tools.verb_parts.discovery_state import DiscoveryState, hashes_of
@@ -45,7 +45,7 @@ def quick(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     _, _, _, train, test, _ = fake_inputs(0.5)
     known = {"a.mcap": train, "b.mcap": test}
-    monkeypatch.setattr(read_module, "read_recording", lambda path, robot, progress=None: known[Path(path).name])
+    monkeypatch.setattr(read_module, "read_motion", lambda path, robot, progress=None: known[Path(path).name])
     found = fake_diagnosis(0.5, held_out=False)
     monkeypatch.setattr(calls, "diagnose_motion", lambda robot, recordings, holdout, **_: found)
 

@@ -44,7 +44,7 @@ def test_what_does_not_go_together_is_refused_in_one_line(options, text, tmp_pat
 @pytest.mark.parametrize(
     ("given", "told"),
     [
-        ([SPRING1, "--rests", SPRING3], "the motors stand often: rests follow --rests"),
+        ([SPRING1, "--rests", SPRING3], " N hang on the arm (/load); expected motion"),
         (["--rests", SPRING3, "--poses", "poses.csv"], "biorob.yaml has no section `poses`"),
     ],
 )
