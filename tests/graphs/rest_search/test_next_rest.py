@@ -49,7 +49,8 @@ def test_a_weight_that_is_hardly_felt_is_to_be_lifted(levers):
     lifted = abs(np.sin(beta.posture["a"] + beta.posture["b"]))
     assert lifted > 0.9 and "b" in beta.matters
     said = next_rest_sentence(beta, robot)
-    assert said.startswith(f"gravity.beta2 (+-{100 * beta.share:.2g} %)") and ": add a rest with " in said and " deg" in said
+    assert said.startswith(f"gravity.beta2 (+-{100 * beta.share:.2g} %)")
+    assert ": add a rest with " in said and " deg" in said
     assert said in rest_calibration_text(result, advice=advice)
 
 
