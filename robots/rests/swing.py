@@ -27,6 +27,7 @@ FIRST, OF_MODE = 2, 4  # values: q0 and c; two amplitudes, frequency and decay
 CURVED = 5.0
 LOWEST, FINEST = 0.5, 0.2  # periods in the stretch, of the slowest swing that is tried, and from one to the next
 PER_PERIOD = 4.0  # errors of their own that a period must have
+SLOW, PEAKS = 30, 15  # frequencies from the slowest one on, and peaks of the spectrum, that are tried
 DECAYS = (0.0, 0.05, 0.2)  # of the frequency w, where a swing is looked for
 MOST_DECAY = 0.7  # of w; what decays faster does not swing
 MOST_SAMPLES = 2000  # the last ones are looked at
@@ -121,9 +122,9 @@ def _with_one_more(t: Array, y: Array, root: Array, values: Array, own: float) -
     highest = own / PER_PERIOD / length
     if highest <= LOWEST / length:
         return None
-    tried, share = np.meshgrid(2.0 * np.pi * np.arange(LOWEST / length, highest, FINEST / length), DECAYS)
-    w, d = tried.ravel(), (tried * share).ravel()
     rest = root * (y - swing(t, values)[0])
+    tried, share = np.meshgrid(_promising(t, root * rest, highest), DECAYS)
+    w, d = tried.ravel(), (tried * share).ravel()
     decay = np.exp(-d[:, None] * (t - t[0])) * root
     scale = np.exp(d * t[0])  # of amplitudes at the end, over those at the begin
     waves = [np.broadcast_to(root, decay.shape), decay * np.cos(w[:, None] * t), decay * np.sin(w[:, None] * t)]
@@ -134,6 +135,28 @@ def _with_one_more(t: Array, y: Array, root: Array, values: Array, own: float) -
     k = int(np.argmax(np.sum(solved * b, axis=1)))
     shift, *amplitudes = solved[k]
     return np.concatenate([[values[0] + shift, 0.0], values[FIRST:], np.array(amplitudes) * scale[k], [w[k], d[k]]])
+
+
+def _promising(t: Array, weighted: Array, highest: float) -> Array:
+    """Frequencies at which a swing is looked for: slow ones, and those at and beside peaks of the spectrum [rad/s].
+
+    Args:
+        t: shape (k,) [s].
+        weighted: what is left of the readings by their weight, shape (k,).
+        highest: that the readings can show [Hz].
+    """
+    length = -float(t[0])
+    grid = np.arange(LOWEST / length, highest, FINEST / length)
+    if len(grid) <= SLOW + 3 * PEAKS:
+        return 2.0 * np.pi * grid
+    even = np.interp(np.linspace(t[0], 0.0, len(t)), t, weighted)
+    spectrum = np.abs(np.fft.rfft(even - even.mean(), n=round(len(t) / FINEST)))
+    at = np.clip(np.round(grid * length / FINEST * len(t) / (len(t) - 1)).astype(int), 0, len(spectrum) - 1)
+    power = spectrum[at]
+    peaks = 1 + np.flatnonzero((power[1:-1] >= power[:-2]) & (power[1:-1] >= power[2:]))
+    best = peaks[np.argsort(power[peaks])[-PEAKS:]]
+    chosen = np.unique(np.concatenate([np.arange(SLOW), best - 1, best, best + 1]))
+    return 2.0 * np.pi * grid[chosen]
 
 
 def _fitted(t: Array, y: Array, root: Array, begin: Array) -> tuple[Array, Array, float]:

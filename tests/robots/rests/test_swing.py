@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
+from jointscope.robots.rests import swing as swing_module
 from jointscope.robots.rests.swing import middle_of_swing, readings_alike, swing
 
 T = np.arange(0.0, 2.0, 0.01)
@@ -88,3 +89,22 @@ def test_slopes_of_a_swing_are_those_of_differences():
         h = 1e-6 * max(abs(value), 1e-2) * np.eye(len(values))[i]
         slope = (swing(t, values + h)[0] - swing(t, values - h)[0]) / (2.0 * h[i])
         np.testing.assert_allclose(J[:, i], slope, rtol=1e-5, atol=1e-6 * np.abs(slope).max())
+
+
+def test_frequencies_that_are_tried_find_what_the_whole_grid_finds(monkeypatch):
+    """The slow reference: every frequency that the readings can show."""
+
+    def every(t, weighted, highest):
+        length = -float(t[0])
+        return 2.0 * np.pi * np.arange(swing_module.LOWEST / length, highest, swing_module.FINEST / length)
+
+    t, rng = np.arange(800) / 400.0, np.random.default_rng(5)
+    for slow, fast in ((3.0, 41.0), (9.0, 150.0), (14.0, 24.0)):
+        d = 0.004 * np.exp(-0.7 * t) * np.cos(slow * t) + 0.001 * np.exp(-0.3 * t) * np.sin(fast * t)
+        readings = 0.2 + d + 2e-5 * rng.normal(size=len(t))
+        chosen = middle_of_swing(t, readings, 2e-5)
+        with monkeypatch.context() as patch:
+            patch.setattr(swing_module, "_promising", every)
+            whole = middle_of_swing(t, readings, 2e-5)
+        assert abs(chosen.value - whole.value) < 0.01 * whole.sigma
+        assert abs(chosen.value - 0.2) < 4.0 * chosen.sigma
