@@ -146,7 +146,10 @@ def test_a_file_that_is_something_else_is_refused(content, told, tmp_path):
 
 def test_an_unknown_robot_is_answered_with_the_ready_ones():
     assert complaint("dogy") == "no robot 'dogy': neither a file nor a ready robot; did you mean 'doggy'?"
-    known = "biorob, biorob_paper, doggy, doggy_paper, hebi_2r, hebi_3r, hebi_5r, kr300, panda, tx90l, xl330_pendulum"
+    known = (
+        "biorob, biorob_paper, doggy, doggy_paper, hebi_2r, hebi_3r, hebi_5r, kr300, panda, tx90l, tx90l_paper, "
+        "xl330_pendulum"
+    )
     assert complaint("x") == f"no robot 'x': neither a file nor a ready robot; expected {known}"
 
 

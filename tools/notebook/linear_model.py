@@ -13,7 +13,8 @@ from jointscope.graphs.fixed_lag.window.state_names import state_names
 from jointscope.robots.dynamics.state_rates import StateRates
 from jointscope.robots.errors import RobotError
 from jointscope.robots.model.encoder_plays import EncoderPlays
-from jointscope.robots.model.robot import SHARPNESS, Robot
+from jointscope.robots.model.robot import SHARPNESS
+from jointscope.tools.notebook.given import AnyRobot, robot_of
 
 Array = NDArray[np.float64]
 
@@ -56,7 +57,7 @@ class LinearModel:
         return np.asarray(np.linalg.solve(s[:, None, None] * unit - self.A, B), dtype=np.complex128)
 
 
-def linear_model(robot: Robot, posture: Mapping[str, float] | None = None) -> LinearModel:
+def linear_model(robot: AnyRobot, posture: Mapping[str, float] | None = None) -> LinearModel:
     """Linearises a robot where it stands.
 
     Dry friction is left out, as linear feedback cannot know it: a joint that slides has it as a constant torque, one
@@ -65,12 +66,13 @@ def linear_model(robot: Robot, posture: Mapping[str, float] | None = None) -> Li
     are not, for the estimator takes them off.
 
     Args:
-        robot: with the values to use, as `calibrate` finds them.
+        robot: with the values to use, as `calibrate` finds them, the name of a ready robot, or the path of a file.
         posture: positions of the joints by name [rad] or [m]; zero where none is given.
 
     Raises:
         RobotError: no equations of motion, no such joint, or a posture in which the springs cannot carry the weight.
     """
+    robot = robot_of(robot)
     robot.need_link_dynamics()
     layout, given = robot.layout, dict(posture or {})
     for joint in given:
