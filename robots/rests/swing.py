@@ -169,7 +169,7 @@ def _fitted(t: Array, y: Array, root: Array, begin: Array) -> tuple[Array, Array
         scale[k : k + 2], scale[k + 2 : k + 4] = np.ptp(y), -1.0 / t[0]
     known = np.eye(len(begin))[1] / CURVED
     inside = np.clip(begin, low + 1e-9 * scale, high - 1e-9 * scale)
-    with np.errstate(over="ignore", invalid="ignore"):  # steps that are far too long, which are taken back
+    with np.errstate(over="ignore", invalid="ignore", divide="ignore"):  # steps far too long, which are taken back
         found = least_squares(
             lambda v: np.append(root * (swing(t, v)[0] - y), v[1] / CURVED),
             inside,

@@ -13,7 +13,6 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.ndimage import median_filter
 from scipy.signal import savgol_filter
 
 from jointscope.robots.dynamics.transmission import joint_angles, motor_angles
@@ -24,12 +23,13 @@ from jointscope.robots.rests.swing import readings_alike
 Array = NDArray[np.float64]
 ARRAYS = ("links", "commands", "sigma", "fall")
 SIDES = (1.0, -1.0)
-GLITCH = 5  # readings, of which the median is looked at
+GLITCH, SURELY = 6.0, 5.0  # times the usual bend between three readings, and [sigma] beside it, of one that is far off
 CROSSED = 3.0  # [sigma] to each side of the middle, of a swing that crosses it
 FEWEST_CROSSINGS = 3
 SMOOTHED = 1.0 / 6.0  # of a period, over which readings are one parabola: 0.03 % off at a turning point
 PARABOLA = 2.25  # variance of the middle of a parabola through k readings, times k
-SHORTEST_WINDOW = 5  # readings
+SHORTEST_WINDOW = 3  # readings
+FEWEST_READINGS = 8  # of a period, which miss a turning point by 7 % at the most
 MANY = 10  # turning points, from which on swings of several frequencies say little of how the first one decays
 SWINGS = 1.2  # [sigma] that a spring's deflection varies by, where noise alone leaves less than one
 FAR = 5.0  # [sigma] of a turning point, from which it is one
@@ -141,13 +141,13 @@ def still_swinging(recording: Recording, robot: Robot, stretch: tuple[float, flo
     stream, turned = recording.streams[link.name], recording.streams[motor.name]
     inside = (stream.times >= stretch[0]) & (stream.times < stretch[1])
     t = stream.times[inside]
-    if len(t) <= GLITCH:
+    if len(t) < FEWEST_READINGS:
         return np.zeros(robot.n, dtype=bool)
     at_motors = np.column_stack([np.interp(t, turned.times, column) for column in turned.values.T])
-    bent = median_filter(motor_angles(robot, stream.values[inside]) - at_motors, (GLITCH, 1), mode="nearest")
+    sigmas = np.sqrt(motor_angles(robot, np.eye(robot.n)).T ** 2 @ link.sigmas**2)
+    bent = _without_glitches(motor_angles(robot, stream.values[inside]) - at_motors, sigmas)
     line = np.column_stack([np.ones_like(t), t - t.mean()])
     left = bent - line @ np.linalg.lstsq(line, bent)[0]
-    sigmas = np.sqrt(motor_angles(robot, np.eye(robot.n)).T ** 2 @ link.sigmas**2)
     return np.asarray(left.std(axis=0) > SWINGS * sigmas)
 
 
@@ -160,13 +160,13 @@ def farthest_turns(times: Array, readings: Array, middle: float, sigma: float) -
         middle: where it comes to rest [rad].
         sigma: of one reading [rad].
     """
-    away = median_filter(readings, GLITCH, mode="nearest") - middle
+    away = _without_glitches(readings[:, None], np.array([sigma]))[:, 0] - middle
     period = _period(times, away, CROSSED * sigma)
     if period is None:
         return None, None
     step = float(times[-1] - times[0]) / (len(times) - 1)
-    window = 2 * int(0.5 * SMOOTHED * period / step) + 1
-    if not SHORTEST_WINDOW <= window < len(times) // 2:
+    window = max(2 * int(0.5 * SMOOTHED * period / step) + 1, SHORTEST_WINDOW)
+    if period < FEWEST_READINGS * step or window >= len(times) // 2:
         return None, None
     smooth, half = savgol_filter(away, window, 2), window // 2
     within = smooth[half:-half]  # a stretch begins anywhere, and its begin is no turning point
@@ -187,6 +187,31 @@ def farthest_turns(times: Array, readings: Array, middle: float, sigma: float) -
         fall = abs(float(smooth[at])) * float(np.expm1(decay * period))
         found.append(Turn(float(times[at - half]), float(times[at + half]), float(smooth[at]), noise, period, fall))
     return found[0], found[1]
+
+
+def _without_glitches(readings: Array, sigmas: Array) -> Array:
+    """Readings, shape (k, n), of which those far off both neighbours are replaced by the mean of these.
+
+    A median would cut off the turning points of a swing that has few readings.
+    """
+    found = readings.copy()
+    between = 0.5 * (readings[:-2] + readings[2:])
+    off = np.abs(readings[1:-1] - between)
+    # the neighbours of a glitch are off by half of it, to the other side
+    usual = np.median(off, axis=0)
+    far = (off > GLITCH * usual + SURELY * sigmas) & (off >= np.maximum(_shifted(off, 1), _shifted(off, -1)))
+    found[1:-1][far] = between[far]
+    return found
+
+
+def _shifted(rows: Array, by: int) -> Array:
+    """Rows before or after, zero where there is none."""
+    found = np.zeros_like(rows)
+    if by > 0:
+        found[by:] = rows[:-by]
+    else:
+        found[:by] = rows[-by:]
+    return found
 
 
 def _way(motors: Stream, j: int, begin: float, period: float) -> float:
