@@ -96,8 +96,10 @@ def friction_curves(problems: Sequence[RestSet], covariance: Array) -> list[Meas
         if problem.rests.q_link is None:
             return []
         # the spring's torque is known better from what hangs on it than from encoders
-        held.append(np.abs(problem.model.drive_gain(calibration.values) * acting + carried) if _elastic(robot)
-                    else np.abs(drive))  # fmt: skip
+        standing = np.abs(problem.model.drive_gain(calibration.values) * acting + carried)
+        largest = np.abs(problem.bands(states, torques, calibration).y)  # where links swung on, at a turning point
+        swung = largest > np.abs(drive)
+        held.append(np.where(swung, largest, standing) if _elastic(robot) else np.abs(drive))
         load.append(np.abs(carried))
         moved.append(problem.rests.moved)
         half.append(torques.half.value)
