@@ -31,7 +31,7 @@ PARABOLA = 2.25  # variance of the middle of a parabola through k readings, time
 SHORTEST_WINDOW = 3  # readings
 FEWEST_READINGS = 8  # of a period, which miss a turning point by 7 % at the most
 MANY = 10  # turning points, from which on swings of several frequencies say little of how the first one decays
-SWINGS = 1.2  # [sigma] that a spring's deflection varies by, where noise alone leaves less than one
+SWINGS = 1.2  # [sigma] that the deflection of a spring varies by, where noise alone leaves one
 FAR = 5.0  # [sigma] of a turning point, from which it is one
 
 
