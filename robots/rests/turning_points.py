@@ -17,6 +17,7 @@ from scipy.signal import savgol_filter
 
 from jointscope.robots.dynamics.transmission import joint_angles, motor_angles
 from jointscope.robots.model.robot import Robot
+from jointscope.robots.parts.sensors import Encoder
 from jointscope.robots.recordings.recording import Recording, Stream
 from jointscope.robots.rests.swing import readings_alike
 
@@ -110,7 +111,7 @@ def turning_points(
     inside = (stream.times >= stretch[0]) & (stream.times < stretch[1])
     times, seen = stream.times[inside], motor_angles(robot, stream.values[inside])
     middle = motor_angles(robot, q_link + link.zero)
-    sigmas = np.sqrt(motor_angles(robot, np.eye(robot.n)).T ** 2 @ link.sigmas**2)
+    sigmas = _seen_by_motors(robot, link)
     found, own = TurningPoints.none(1, robot.n), np.zeros((2, robot.n))
     for j in range(robot.n):
         for side, turn in enumerate(farthest_turns(times, seen[:, j], float(middle[j]), float(sigmas[j]))):
@@ -144,7 +145,7 @@ def still_swinging(recording: Recording, robot: Robot, stretch: tuple[float, flo
     if len(t) < FEWEST_READINGS:
         return np.zeros(robot.n, dtype=bool)
     at_motors = np.column_stack([np.interp(t, turned.times, column) for column in turned.values.T])
-    sigmas = np.sqrt(motor_angles(robot, np.eye(robot.n)).T ** 2 @ link.sigmas**2)
+    sigmas = _seen_by_motors(robot, link)
     bent = _without_glitches(motor_angles(robot, stream.values[inside]) - at_motors, sigmas)
     line = np.column_stack([np.ones_like(t), t - t.mean()])
     left = bent - line @ np.linalg.lstsq(line, bent)[0]
@@ -189,6 +190,11 @@ def farthest_turns(times: Array, readings: Array, middle: float, sigma: float) -
     return found[0], found[1]
 
 
+def _seen_by_motors(robot: Robot, link: Encoder) -> Array:
+    """Sigmas of the links' encoders as the motors see the links, shape (n,) [rad]."""
+    return np.asarray(np.sqrt(motor_angles(robot, np.eye(robot.n)).T ** 2 @ link.sigmas**2))
+
+
 def _without_glitches(readings: Array, sigmas: Array) -> Array:
     """Readings, shape (k, n), of which those far off both neighbours are replaced by the mean of these.
 
@@ -198,19 +204,9 @@ def _without_glitches(readings: Array, sigmas: Array) -> Array:
     between = 0.5 * (readings[:-2] + readings[2:])
     off = np.abs(readings[1:-1] - between)
     # the neighbours of a glitch are off by half of it, to the other side
-    usual = np.median(off, axis=0)
-    far = (off > GLITCH * usual + SURELY * sigmas) & (off >= np.maximum(_shifted(off, 1), _shifted(off, -1)))
+    beside = np.pad(off, ((1, 1), (0, 0)))
+    far = (off > GLITCH * np.median(off, axis=0) + SURELY * sigmas) & (off >= np.maximum(beside[:-2], beside[2:]))
     found[1:-1][far] = between[far]
-    return found
-
-
-def _shifted(rows: Array, by: int) -> Array:
-    """Rows before or after, zero where there is none."""
-    found = np.zeros_like(rows)
-    if by > 0:
-        found[by:] = rows[:-by]
-    else:
-        found[:by] = rows[-by:]
     return found
 
 

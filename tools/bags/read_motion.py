@@ -14,11 +14,10 @@ from jointscope.robots.model.command_words import edited_argument, robot_argumen
 from jointscope.robots.model.robot import Robot
 from jointscope.robots.recordings.recording import Notice, Recording
 from jointscope.robots.recordings.still_stretches import OFTEN, share_of, standing
-from jointscope.tools.bags.messages.open_bag import Progress, open_bag
+from jointscope.tools.bags.load_topic import LOAD, load_messages
+from jointscope.tools.bags.messages.open_bag import Progress
 from jointscope.tools.bags.read_recording import read_recording
 
-LOAD = "/load"
-LOAD_TYPE = "geometry_msgs/msg/WrenchStamped"
 MANY_RESTS = 10  # stretches in which motors stand, from which a recording looks like one of rests
 
 
@@ -55,12 +54,7 @@ def read_motion(path: str | Path, robot: Robot, progress: Progress | None = None
 
 def _largest_load(path: Path) -> float:
     """Largest force of the topic of loads; 0 where there is none, or something else has its name [N]."""
-    with open_bag(path) as bag:
-        if LOAD not in bag.topics:
-            return 0.0
-        kind = bag.message_type(LOAD)
-        if kind.name != LOAD_TYPE:
-            return 0.0
-        forces = [kind.decode(raw).wrench.force for raw in bag.read([LOAD])[LOAD].data]
+    _, messages = load_messages(path) or ("", [])
+    forces = [message.wrench.force for message in messages]
     sizes = [float(np.linalg.norm([force.x, force.y, force.z])) for force in forces]
     return max(sizes, default=0.0)

@@ -16,7 +16,7 @@ from jointscope.tools.bags.clocks.durations import counted
 from jointscope.tools.presentation.next_rest_text import next_rest_sentence
 from jointscope.tools.presentation.numbers import significant, with_sigma
 from jointscope.tools.terminal.text_table import text_table
-from jointscope.tools.verdicts.rests.rest_verdict import verdict
+from jointscope.tools.verdicts.rests.rest_verdict import verdict, widened
 
 SLIGHTLY = 1.2  # times that a sigma may be widened without a word
 
@@ -59,11 +59,10 @@ def rest_notices(recordings: Sequence[Rests]) -> list[str]:
 
 def _widened(result: RestCalibration) -> str:
     """That sigmas of link encoders were widened until one is what comes out; empty where they were not."""
-    scale = result.problems[0].repeatability
-    j = int(scale.argmax())
-    if scale[j] < SLIGHTLY:
-        return ""
-    return f"; the sigma of {result.robot.joints[j]}'s link encoder was widened {significant(float(scale[j]), 2)} times"
+    joint, times = widened(result.seen)
+    return (
+        "" if times < SLIGHTLY else f"; the sigma of {joint}'s link encoder was widened {significant(times, 2)} times"
+    )
 
 
 def _advised(result: RestCalibration, advice: Sequence[NextRest]) -> list[str]:

@@ -19,8 +19,7 @@ from jointscope.robots.rests.angle_units import check_angle_units
 from jointscope.robots.rests.load_history import LoadHistory
 from jointscope.robots.rests.rests import Rests, find_rests
 from jointscope.tools.bags.at_poses.load_table import check_loads, loads_beside, loads_from_table
-from jointscope.tools.bags.messages.open_bag import open_bag
-from jointscope.tools.bags.read_motion import LOAD, LOAD_TYPE
+from jointscope.tools.bags.load_topic import LOAD, LOAD_TYPE, load_messages
 from jointscope.tools.bags.read_recording import read_recording
 
 
@@ -59,13 +58,12 @@ def _loads(path: Path, robot: Robot, recording: Recording) -> LoadHistory | None
     Raises:
         RecordingError: of another type, on a link that is not there, torques, or weights in grams.
     """
-    with open_bag(path) as bag:
-        if LOAD not in bag.topics:
-            return None
-        kind = bag.message_type(LOAD)
-        if kind.name != LOAD_TYPE:
-            raise RecordingError(f"{path}: topic {LOAD}: expected {LOAD_TYPE}, got {kind.name}")
-        messages = [kind.decode(raw) for raw in bag.read([LOAD])[LOAD].data]
+    said = load_messages(path)
+    if said is None:
+        return None
+    kind, messages = said
+    if kind != LOAD_TYPE:
+        raise RecordingError(f"{path}: topic {LOAD}: expected {LOAD_TYPE}, got {kind}")
     _must_have_one_clock(path, recording)
     stamps = np.array([m.header.stamp.sec * 10**9 + m.header.stamp.nanosec for m in messages], dtype=np.int64)
     forces = np.array([[m.wrench.force.x, m.wrench.force.y, m.wrench.force.z] for m in messages], dtype=float)

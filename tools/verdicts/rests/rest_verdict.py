@@ -52,7 +52,7 @@ def verdict(result: RestCalibration) -> str:
         return f"{SO[level]}: {said}{silent and f'; {silent}'}."
     if silent:
         return f"{USABLE}: {silent}."
-    if result.errors.error > AS_EXPECTED or _widened(seen)[1] > WIDENED:
+    if result.errors.error > AS_EXPECTED or widened(seen)[1] > WIDENED:
         return f"{USABLE}: links rest further from where the model says than their encoders explain."
     limits = unchecked(seen)
     return f"Yes, the model holds at these rests{f', as far as they tell. {limits}' if limits else ''}."
@@ -93,7 +93,7 @@ def _more(result: RestCalibration, loose: Sequence[ParameterEstimate]) -> str:
     return f"about {counted(more, 'time')} more, in other postures or with other weights"
 
 
-def _widened(seen: SeenRests) -> tuple[str, float]:
+def widened(seen: SeenRests) -> tuple[str, float]:
     """The joint whose link encoder repeats worst, and its sigma over the stated one."""
     scale = seen.problems[0].repeatability
     j = int(scale.argmax())
@@ -102,10 +102,10 @@ def _widened(seen: SeenRests) -> tuple[str, float]:
 
 def _misfit(seen: SeenRests) -> str:
     """Links far from where the model has them, friction far beyond its band; empty where noise explains all."""
-    joint, widened = _widened(seen)
-    if widened > FAR:
+    joint, times = widened(seen)
+    if times > FAR:
         return (
-            f"{joint} rests {significant(widened, 2)} sigmas of its encoder away, and its sigma was widened by as much "
+            f"{joint} rests {significant(times, 2)} sigmas of its encoder away, and its sigma was widened by as much "
             "to go on, unless other loads hung there than /load says"
         )
     bands, rigid = seen.errors.bands, all_rigid(seen.robot)
