@@ -43,18 +43,9 @@ def still_stretches(times: Array, values: Array, within: Array) -> list[tuple[fl
         values: shape (k, c).
         within: of each channel, shape (c,).
     """
-    found, start = [], 0
-    low, high = values[0].copy(), values[0].copy()
-    for k in range(1, len(times) + 1):
-        ends = k == len(times) or times[k] - times[k - 1] > LONG_PAUSE
-        if not ends:
-            lower, upper = np.minimum(low, values[k]), np.maximum(high, values[k])
-            ends = bool(np.any(upper - lower > within))
-        if not ends:
-            low, high = lower, upper
-            continue
-        if times[k - 1] - times[start] >= SHORTEST:
-            found.append((float(times[start]), float(times[k - 1])))
-        if k < len(times):
-            start, low, high = k, values[k].copy(), values[k].copy()
-    return found
+    from jointscope.robots.recordings.still_kernel import ends_of_stretches  # numba takes half a second to import
+
+    ends = ends_of_stretches(*(np.ascontiguousarray(part) for part in (times, values, within)), LONG_PAUSE)
+    starts = np.append(0, ends[:-1])
+    long = times[ends - 1] - times[starts] >= SHORTEST
+    return [(float(a), float(b)) for a, b in zip(times[starts[long]], times[ends[long] - 1], strict=True)]

@@ -12,7 +12,7 @@ import pytest
 from jointscope.robots.errors import RecordingError
 from jointscope.robots.files.robot_file import load_robot
 from jointscope.robots.recordings.recording import Recording, Stream
-from jointscope.robots.recordings.still_stretches import still_stretches
+from jointscope.robots.recordings.still_stretches import LONG_PAUSE, SHORTEST, still_stretches
 from jointscope.robots.rests.creep import creep_of, creeping_stretches, fastest_creep
 from jointscope.robots.rests.load_history import LoadHistory
 from jointscope.robots.rests.rests import find_rests
@@ -112,6 +112,29 @@ def test_a_stretch_ends_where_a_channel_leaves_its_range_or_samples_are_missing(
     np.testing.assert_allclose(still_stretches(times, values, np.array([0.1])), [(0.0, 0.9), (3.0, 3.9)])
     values[5:, 0] = 0.05
     assert len(still_stretches(times, values, np.array([0.01]))) == 1  # half a second is too short before the step
+
+
+def stretches_sample_by_sample(times, values, within):
+    """The same stretches by a plain loop."""
+    found, start = [], 0
+    for k in range(1, len(times) + 1):
+        inside = values[start : k + 1]
+        if k < len(times) and times[k] - times[k - 1] <= LONG_PAUSE and np.all(np.ptp(inside, axis=0) <= within):
+            continue
+        if times[k - 1] - times[start] >= SHORTEST:
+            found.append((times[start], times[k - 1]))
+        start = k
+    return found
+
+
+def test_stretches_are_those_of_a_plain_loop():
+    rng = np.random.default_rng(4)
+    times = np.cumsum(rng.uniform(0.005, 0.015, 4000) + 0.7 * (rng.uniform(size=4000) < 0.002))
+    walk = np.cumsum(rng.normal(0.0, 1.0, (4000, 3)) * (np.sin(times)[:, None] > -0.3), axis=0)
+    within = np.array([15.0, 25.0, 40.0])
+    expected = stretches_sample_by_sample(times, walk, within)
+    assert len(expected) > 10
+    np.testing.assert_array_equal(still_stretches(times, walk, within), expected)
 
 
 def test_encoders_with_another_zero_read_the_same():
