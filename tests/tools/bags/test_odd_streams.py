@@ -128,6 +128,40 @@ def test_of_a_staircase_the_first_of_each_run_stays(factor):
     assert notice.text.startswith(f"motor_encoder: {factor} messages for each sample")
 
 
+def lacking(samples, share=0.02):
+    """The same samples, in some of which one joint or the other is no number, as the readers hand them on."""
+    values = samples.values.copy()
+    values[np.random.default_rng(5).random(values.shape) < share] = np.nan
+    return without_gibberish("motor_encoder", CHANNELS, dataclasses.replace(samples, values=values))[0]
+
+
+@pytest.mark.parametrize("counts", (2 * np.pi / 4096, 1e-2), ids=("4096 counts", "coarse"))
+@pytest.mark.parametrize("hz", (2.0, 0.05), ids=("fast", "slow"))
+def test_what_fills_a_gap_lies_between_the_counts_of_an_encoder_and_is_no_sign_of_anything(counts, hz):
+    samples = lacking(motion(counts=counts, hz=hz))
+    assert samples.filled.any()
+    for step in (without_second_publisher, without_glitches):
+        kept, notices = step("motor_encoder", CHANNELS, samples)
+        assert len(kept) == len(samples) and not notices
+    kept, notices = without_repetitions("motor_encoder", samples)
+    assert len(kept) == len(samples) and not notices
+
+
+def test_a_staircase_and_glitches_are_found_among_numbers_that_lack():
+    plain = motion(counts=1e-4)
+    samples = lacking(dataclasses.replace(plain, values=np.repeat(plain.values[::4], 4, axis=0)))
+    kept, (notice,) = without_repetitions("motor_encoder", samples)
+    firsts = np.setdiff1d(
+        np.append(plain.stamps[:600:4], plain.stamps[752::4]), samples.stamps[samples.filled.any(axis=1)]
+    )
+    assert notice.kind == "staircase" and np.isin(firsts, kept.stamps).all() and len(kept) < 0.3 * len(plain)
+    plain.values[700, 0] += 0.5
+    samples = lacking(plain)
+    assert samples.measured[700, 0]
+    kept, (notice,) = without_glitches("motor_encoder", CHANNELS, samples)
+    assert set(samples.stamps) - set(kept.stamps) == {plain.stamps[700]}
+
+
 def test_a_driver_a_little_faster_than_its_device_is_a_staircase_too():
     samples = motion()
     place = np.floor(np.arange(1500) * 0.8).astype(int)

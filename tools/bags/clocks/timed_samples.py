@@ -40,6 +40,21 @@ class TimedSamples:
         return replace(self, stamps=stamps)
 
     @property
+    def measured(self) -> NDArray[np.bool_]:
+        """Whether a value was measured, shape (n, m)."""
+        return np.ones(self.values.shape, bool) if self.filled is None else ~self.filled
+
+    @property
+    def held(self) -> NDArray[np.float64]:
+        """The value measured last, or first of all, where another stands for it, shape (n, m)."""
+        if self.filled is None:
+            return self.values
+        rows = np.where(self.filled, 0, np.arange(len(self))[:, None])
+        first = np.argmax(self.measured, axis=0)
+        last = np.maximum(np.maximum.accumulate(rows, axis=0), first)
+        return np.take_along_axis(self.values, last, axis=0)
+
+    @property
     def latency(self) -> NDArray[np.float64]:
         """How much later than its stamp each sample was written, shape (n,) [s]; whole numbers are subtracted first."""
         return (self.received - self.stamps) / 1e9

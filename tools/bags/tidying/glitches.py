@@ -44,7 +44,9 @@ def without_glitches(
     """
     values = samples.values if not period else np.unwrap(samples.values, period=period, axis=0)
     since = (samples.stamps - samples.stamps[0]) / 1e9
-    wild = np.column_stack([wild_samples(column) for column in values.T])
+    measured, wild = samples.measured, np.zeros(values.shape, bool)
+    for j, seen in enumerate(measured.T):
+        wild[seen, j] = wild_samples(values[seen, j])
     rows = np.asarray(wild.any(axis=1))
     count = int(np.count_nonzero(rows))
     if not count:

@@ -38,7 +38,7 @@ def without_second_publisher(
     Raises:
         RecordingError: two nodes publish, and nothing tells which of them is right.
     """
-    foreign = of_second_publisher(samples.values)
+    foreign = of_second_publisher(samples.held)
     count = int(np.count_nonzero(foreign))
     kept, notices = samples.take(~foreign), []
     if count:
@@ -91,9 +91,10 @@ def _refuse_mixed(name: str, channels: tuple[str, ...], samples: TimedSamples) -
     """Two streams woven into one: again and again the next sample is far away, and the one after it is near."""
     if len(samples) < 20:
         return
-    back = np.abs(samples.values[2:] - samples.values[:-2])
-    there = np.abs(np.diff(samples.values, axis=0))[:-1]
-    usual = np.maximum(np.median(back, axis=0), smallest_changes(samples.values[::2]))
+    values = samples.held
+    back = np.abs(values[2:] - values[:-2])
+    there = np.abs(np.diff(values, axis=0))[:-1]
+    usual = np.maximum(np.median(back, axis=0), smallest_changes(values[::2]))
     jumps = (there > FAR * usual) & (FARTHER * back < there)
     counts = np.count_nonzero(jumps, axis=0)
     worst = int(np.argmax(counts))

@@ -28,8 +28,9 @@ def without_repetitions(name: str, samples: TimedSamples) -> tuple[TimedSamples,
         name: of the stream.
         samples: in the order of their stamps, finite.
     """
-    repeats = np.concatenate([[False], np.all(samples.values[1:] == samples.values[:-1], axis=1)])
-    runs = _runs_in_motion(samples.values, repeats)
+    values = samples.held  # what fills a gap lies between the steps of a counter
+    repeats = np.concatenate([[False], np.all(values[1:] == values[:-1], axis=1)])
+    runs = _runs_in_motion(values, repeats & samples.measured.all(axis=1))
     if len(runs) < FEWEST or float(np.mean(runs)) < 1.0 / (1.0 - SHARE):
         return samples, []
     per_sample = float(np.mean(runs))

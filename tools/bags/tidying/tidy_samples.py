@@ -49,7 +49,8 @@ def plausible_samples(name: str, samples: TimedSamples) -> TimedSamples:
     if not sound.any():
         return samples
     whole = filled_in(samples)
-    seen = replace(whole, values=whole.values[:, sound], filled=None)
+    filled = None if whole.filled is None else whole.filled[:, sound]
+    seen = replace(whole, values=whole.values[:, sound], filled=filled)
     kept = cleaned_sensor(name, tuple(map(str, np.flatnonzero(sound))), seen)[0].stamps
     return replace(whole, values=np.where(sound, whole.values, samples.values)).take(np.isin(whole.stamps, kept))
 
