@@ -159,12 +159,12 @@ def calibrate_rests(
     found = robot.with_values({p.name: p.value for p in told})
     found = replace(found, parameters=with_sigmas(found.parameters, {p.name: p.sigma for p in told}))
     peak, found = (as_given(each, given, unheard) for each in (peak, found))
-    covariance = with_priors(covariance * np.outer(scale, scale), calibration.names, given)
-    problems = [problem.of_robot(given) for problem in problems]
     derived = [
         p for p, result in zip(derived_results(robot, calibration, covariance), robot.derived, strict=True)
         if set(result.of) <= known
     ]  # fmt: skip
+    covariance = with_priors(covariance * np.outer(scale, scale), calibration.names, given)
+    problems = [problem.of_robot(given) for problem in problems]
     asked = AskedOfRests.of(whole, robot, x, likeliest, said)
     report("done", 1.0)
     return RestCalibration(

@@ -38,6 +38,29 @@ def test_spring_curve_and_friction_band_come_out_with_sigmas_that_hold(tmp_path)
     assert held_out.error < 1.05 * exact.error
 
 
+DERIVED = """derived:
+  spring: {unit: N m/rad, of: {swing.stiffness: 2.0}}
+  friction.c0: {unit: N m, of: {swing.coulomb_torque: 1.0}}
+  friction.c1: {unit: '1', of: {swing.weight_dependent_friction.coefficient: 0.5}}
+"""
+
+
+def test_a_result_that_is_a_value_in_other_words_has_its_sigma(tmp_path):
+    path = lever(tmp_path).path
+    viscous = "  swing.motor_viscous.coefficient: {value: 0.3, unit: N m s/rad, prior_sigma: 1.0}\n"
+    viscous += "effects: [motor_viscous@swing, "
+    path.write_text(path.read_text(encoding="utf-8").replace("effects: [", viscous, 1) + DERIVED, encoding="utf-8")
+    result = calibrate_rests(load_robot(path), [hanging(60, 1)])  # viscous friction is held, being none of rests
+    found, derived = ({p.name: p for p in part} for part in (result.parameters, result.derived))
+    for name, of, factor in (
+        ("spring", "swing.stiffness", 2.0),
+        ("friction.c0", "swing.coulomb_torque", 1.0),
+        ("friction.c1", "swing.weight_dependent_friction.coefficient", 0.5),
+    ):
+        assert derived[name].value == pytest.approx(factor * found[of].value, rel=1e-9)
+        assert derived[name].sigma == pytest.approx(factor * found[of].sigma, rel=1e-6)
+
+
 def test_motors_that_creep_tell_their_friction_better_than_those_that_stand(tmp_path):
     robot = lever(tmp_path)
     stands, creeps = (calibrate_rests(robot, [hanging(40, 5, creeping=n)]) for n in (0, 30))
