@@ -26,7 +26,7 @@ graphs.comparison graphs.refits graphs.judging graphs.discovery graphs.across_ki
 graphs.fixed_lag.window
 graphs.fixed_lag.messages graphs.fixed_lag graphs.fixed_lag.replay
 tools.writing tools.bags.clocks tools.bags.tidying tools.bags.messages tools.bags
-tools.bags.at_poses
+tools.bags.at_poses tools.bags.descriptions
 tools.simulator.world tools.simulator.loop tools.simulator.effects tools.simulator.arm tools.simulator
 tools.closed_loop.planning tools.closed_loop.controllers tools.closed_loop.sources tools.closed_loop
 tools.export tools.acceptance tools.init.streams tools.init.estimates tools.init tools.init.text

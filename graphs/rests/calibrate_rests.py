@@ -60,7 +60,7 @@ class RestCalibration:
         silent: names of the parameters of which they say nothing.
         covariance: of the values of all free parameters, shape (p, p).
         doubts: what would make the rests far likelier.
-        unnoticed: how wrong masses and loads may be before they contradict; empty of robots with springs.
+        unnoticed: how wrong masses and loads may be before they contradict.
         before, errors: of each recording, at the start values and at those found.
         iterations: of all stages.
         cost: at the end.

@@ -1,12 +1,16 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What else would make rests of rigid joints far likelier: their bands are the only witnesses.
+"""What else would make rests far likelier: other weights, zeros, torques, friction that grows with what it carries.
 
-Friction is spread evenly over its band and knows nothing of what the joint carries. If a band gets narrower by a factor
-r once k values more are free, the likelihood grows by r^-n, and what evenly spread torques of n rests do by chance is
+The bands of friction are all that rigid joints have for witnesses. Friction is spread evenly over its band and knows
+nothing of what the joint carries. If a band gets narrower by a factor r once k values more are free, the likelihood
+grows by r^-n, and what evenly spread torques of n rests do by chance is
 
     p = P(R < r),   R ~ Beta(n - k, k)       [largest deviation over that around k fitted values]
 
 exact for k = 1, a constant; the logarithm of it is half a chi2 of 2 k degrees of freedom where rests are many.
+
+Springs have the encoders of their links, too, whose share of the fall is a chi2 of k degrees of freedom; the one of
+2 k, which is larger, is asked of both together.
 """
 
 from __future__ import annotations
@@ -16,7 +20,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import betainc
+from scipy.special import betainc, gammaincc
 
 from jointscope.factors.calibration import Calibration
 from jointscope.graphs.rest_sets.rest_set import RestSet
@@ -51,23 +55,25 @@ class Doubt:
 
 @dataclass(frozen=True)
 class AskedOfRests:
-    """Rests of rigid joints, linearised with every effect that they are asked for at its null value.
+    """Rests, linearised with every effect that they are asked for at its null value.
 
     Attributes:
         linear: about the solution, by values.
         base: columns of the values of the model, shape (p,).
         groups: columns of the sizes of each effect, by label.
+        rigid: whether bands are all that says anything.
     """
 
     linear: LinearRests
     base: NDArray[np.intp]
     groups: Mapping[str, NDArray[np.intp]]
+    rigid: bool
 
     @staticmethod
     def of(
         problem: RestSet, robot: Robot, x: Array, calibration: Calibration, elsewhere: SaidElsewhere | None = None
     ) -> AskedOfRests | None:
-        """None of robots with springs, whose encoders are asked, and where no band says anything.
+        """None where no band says anything.
 
         Args:
             problem: all rests with their weights.
@@ -76,15 +82,16 @@ class AskedOfRests:
             calibration: values there.
             elsewhere: what other recordings say, in place of priors.
         """
-        if not all_rigid(robot):
-            return None
         tried = [h for h in hypotheses_of(robot, at_rest=True) if h.here.effect.id in ASKED]
         by_values = RestsByValues.of(problem, at_null(robot, tried), x, calibration, elsewhere)
         if not len(by_values.linear.motor):
             return None
         groups = {h.label: _columns(h, by_values.calibration.names) for h in tried}
-        linear, places = _by_angle(by_values.linear, problem, robot)
-        return AskedOfRests(linear, np.arange(len(calibration.names)), groups | places)
+        rigid, linear = all_rigid(robot), by_values.linear
+        if rigid:
+            linear, places = _by_angle(linear, problem, robot)
+            groups |= places
+        return AskedOfRests(linear, np.arange(len(calibration.names)), groups, rigid)
 
     def doubts(self) -> tuple[Doubt, ...]:
         """All that is no chance, least likely first, then what takes fewer values for it."""
@@ -95,15 +102,21 @@ class AskedOfRests:
                 d, cost = self.linear.minimum(np.concatenate([self.base, columns]))
                 sizes[label] = k
                 fall, size = max(2.0 * (least - cost), 0.0), float(d[len(self.base)])
-                found.append(Doubt(label, fall, float(betainc(n - k, k, np.exp(-0.5 * fall / n))), size))
+                chance = betainc(n - k, k, np.exp(-0.5 * fall / n)) if self.rigid else gammaincc(k, 0.5 * fall)
+                found.append(Doubt(label, fall, float(chance), size))
         counted = [replace(doubt, p_value=min(len(found) * doubt.p_value, 1.0)) for doubt in found]
         return tuple(
             sorted((d for d in counted if d.p_value < LIKELY), key=lambda d: (d.p_value, sizes[d.label], -d.fall))
         )
 
     def told(self, columns: NDArray[np.intp]) -> tuple[int, int]:
-        """Rests of the motor with most of them, and combinations of values that shift bands beyond chance."""
+        """Rests of the motor with most of them, and combinations of values that shift bands beyond chance.
+
+        Where links have encoders of their own, all rests and all values.
+        """
         linear = self.linear
+        if not self.rigid:
+            return len(linear.motor) + len(columns), len(columns)
         size = 1.0 / np.sqrt(np.diag(linear.A)[columns])
         rows = np.vstack([linear.Y[:, columns], linear.H[:, columns]]) * size / np.tile(linear.half, 2)[:, None]
         seen = np.any(rows != 0.0, axis=1).reshape(2, -1).any(axis=0)

@@ -30,7 +30,7 @@ class SeenRests:
         parameters: that were found.
         errors: of each recording.
         doubts: what would make the rests far likelier.
-        unnoticed: how wrong masses and loads may be before they contradict; empty of robots with springs, and beside
+        unnoticed: how wrong masses and loads may be before they contradict; empty beside
             motion, which tells of masses itself.
     """
 

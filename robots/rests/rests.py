@@ -128,7 +128,8 @@ def find_rests(recording: Recording, robot: Robot, loads: LoadHistory) -> Rests:
         q_motor, motor_scatter = _mean(recording, motor.name, a, t1)
         u, u_scatter = _mean(recording, "command", a, t1)
         q_link, link_scatter = (q_motor * np.nan, q_motor * 0.0) if link is None else _mean(recording, link.name, a, t1)
-        drifts.append(drift(recording, robot, t0, t1))
+        # a motor that creeps moves the links of others
+        drifts.append(drift(recording, robot, t0, t1) if (t0, t1) in stands else 0.0)
         if link is not None and np.any(link_scatter > SWINGING * link.sigmas):
             swinging += 1
             continue

@@ -6,6 +6,8 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from jointscope.tools.bags.messages.open_bag import open_bag
 
 LOAD = "/load"
@@ -21,3 +23,11 @@ def load_messages(path: Path) -> tuple[str, list[Any]] | None:
         if kind.name != LOAD_TYPE:
             return kind.name, []
         return kind.name, [kind.decode(raw) for raw in bag.read([LOAD])[LOAD].data]
+
+
+def largest_load(path: Path) -> float:
+    """Largest force of the topic of loads; 0 where there is none, or something else has its name [N]."""
+    _, messages = load_messages(path) or ("", [])
+    forces = [message.wrench.force for message in messages]
+    sizes = [float(np.linalg.norm([force.x, force.y, force.z])) for force in forces]
+    return max(sizes, default=0.0)

@@ -9,8 +9,8 @@ from pathlib import Path
 from jointscope.robots.errors import EffectError
 from jointscope.robots.files.effects_at_once import add_effects, remove_effects
 from jointscope.robots.model.robot import Robot
-from jointscope.tools.bags.bag_description import BagDescription
-from jointscope.tools.bags.describe_bag import describe_bag
+from jointscope.tools.bags.descriptions.bag_description import BagDescription
+from jointscope.tools.bags.descriptions.describe_bag import describe_bag
 from jointscope.tools.export.exported_files import ExportedFiles, export_files
 from jointscope.tools.notebook.given import AnyRobot, robot_of
 

@@ -13,6 +13,7 @@ from jointscope.robots.errors import RecordingError
 from jointscope.robots.model.robot import Robot
 from jointscope.robots.recordings.recording import Notice, Recording
 from jointscope.robots.recordings.target_plausibility import LATE_TRACKER, MOVED_TRACKER
+from jointscope.tools.bags.read_motion import REST_TOUR
 from jointscope.tools.terminal.progress import ERASE_LINE
 
 LIMIT = "limit"
@@ -23,6 +24,7 @@ CONTRADICTED = (
 BEYOND_LIMITS = (
     "Look at this first: a limit of the URDF may be wrong, or a unit; the calibration goes on without limits.\n"
 )
+RESTS = "Look at this first: rests take seconds as such, and minutes as motion (Ctrl-C ends it).\n"
 JUMPED = "Look at this first: values of a recording in which an encoder jumps are those of no robot.\n"
 
 
@@ -41,8 +43,9 @@ def first_look(robot: Robot, recordings: Sequence[Recording], stream: TextIO | N
     seen: dict[str, str] = {}
     kinds = set()
     for recording in recordings:
-        for notice in _screened(recording, robot):
-            if notice.kind in (*PLAIN_MISTAKES, LIMIT, LATE_TRACKER, MOVED_TRACKER):
+        tours = [notice for notice in recording.notices if notice.kind == REST_TOUR]
+        for notice in (*tours, *_screened(recording, robot)):
+            if notice.kind in (*PLAIN_MISTAKES, LIMIT, LATE_TRACKER, MOVED_TRACKER, REST_TOUR):
                 seen.setdefault(notice.text, recording.path)
                 kinds.add(notice.kind)
     if not seen:
@@ -50,7 +53,8 @@ def first_look(robot: Robot, recordings: Sequence[Recording], stream: TextIO | N
     lead = ERASE_LINE if stream.isatty() else ""
     for text, path in seen.items():
         stream.write(f"{lead}{path}: {text}\n")
-    stream.write({frozenset({LIMIT}): BEYOND_LIMITS, frozenset({JUMP}): JUMPED}.get(frozenset(kinds), CONTRADICTED))
+    leads = {LIMIT: BEYOND_LIMITS, JUMP: JUMPED, REST_TOUR: RESTS}
+    stream.write(leads.get(kinds.pop(), CONTRADICTED) if len(kinds) == 1 else CONTRADICTED)
     stream.flush()
 
 

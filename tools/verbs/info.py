@@ -40,7 +40,7 @@ def run(args: argparse.Namespace) -> int:
     """Describes the bag; a bag that the robot cannot use is an answer, not a failure."""
     check_outputs([args.json], inputs=[args.bag, *args.effects])
     from jointscope.robots.errors import RecordingError
-    from jointscope.tools.bags.describe_bag import describe_bag
+    from jointscope.tools.bags.descriptions.describe_bag import describe_bag
     from jointscope.tools.bags.messages.open_bag import BAG_SUFFIXES
 
     other = Path(args.robot or "")
@@ -74,7 +74,7 @@ def run(args: argparse.Namespace) -> int:
 def _locked(bag: Path, robot: Robot) -> tuple[dict[str, Any], str]:
     """What a bag with locked springs has, and the transmission that it shows, for machines and for the screen."""
     from jointscope.robots.errors import JointscopeError
-    from jointscope.tools.bags.describe_bag import describe_bag
+    from jointscope.tools.bags.descriptions.describe_bag import describe_bag
     from jointscope.tools.bags.read_locked import read_coupling
     from jointscope.tools.terminal.coupling_text import coupling_text
 

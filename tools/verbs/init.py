@@ -66,7 +66,7 @@ def run(args: argparse.Namespace) -> int:
     """Guesses, writes, reads the file again and says whether the bag fits it."""
     check_outputs([args.output, args.json], inputs=[args.urdf, args.bag])
     from jointscope.robots.files.robot_file import load_robot, urdf_reference
-    from jointscope.tools.bags.describe_bag import describe_bag
+    from jointscope.tools.bags.descriptions.describe_bag import describe_bag
     from jointscope.tools.init.estimates.target_places import find_targets
     from jointscope.tools.init.robot_guess import guess_robot
     from jointscope.tools.init.streams.other_joints import Typed

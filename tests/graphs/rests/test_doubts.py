@@ -14,6 +14,7 @@ from lever_bench import C0, hanging, lever
 from scipy.stats import beta, kstest
 
 from jointscope.graphs.rests.calibrate_rests import calibrate_rests
+from jointscope.robots.files.robot_file import load_robot
 from jointscope.tools.verdicts.rests.rest_verdict import verdict
 
 WEIGHT = 2.0 * 9.81 * 0.3  # [N m] of the rod and what is on it, where it is level
@@ -96,3 +97,32 @@ def test_by_chance_a_band_around_a_constant_is_narrower_as_the_p_value_says():
     y = np.random.default_rng(1).uniform(-1.0, 1.0, (4000, 9))
     narrower = 0.5 * np.ptp(y, axis=1) / np.abs(y).max(axis=1)
     assert kstest(narrower, beta(8, 1).cdf).pvalue > 0.01
+
+
+@pytest.mark.parametrize("share", (0.99, 1.01))
+def test_loads_off_by_a_percent_are_told_where_links_have_springs_and_encoders(tmp_path, share):
+    robot, rests = lever(tmp_path), hanging(60, 1)
+    assert not calibrate_rests(robot, [rests]).doubts
+    result = calibrate_rests(robot, [replace(rests, forces=share * rests.forces)])
+    first = result.doubts[0]
+    assert first.label == "load_scale@robot" and 1.0 + first.size == pytest.approx(1.0 / share, abs=0.003)
+    said = verdict(result)
+    assert said.startswith("No, do not rely on this yet: these rests are far likelier")
+    assert f"if loads are {1.0 + first.size:.3f} of what /load says" in said
+
+
+def test_right_loads_of_springs_are_not_doubted(tmp_path):
+    robot = lever(tmp_path)
+    for seed in (11, 12, 13, 14):
+        assert not calibrate_rests(robot, [hanging(40, seed)]).doubts
+
+
+def test_friction_that_grows_with_the_load_is_told_where_springs_carry_it(tmp_path):
+    path = lever(tmp_path).path
+    text = path.read_text(encoding="utf-8").replace(", weight_dependent_friction@swing", "")
+    path.write_text(
+        "\n".join(line for line in text.splitlines() if "weight_dependent_friction" not in line), encoding="utf-8"
+    )
+    result = calibrate_rests(load_robot(path), [hanging(60, 1)])
+    assert {doubt.label for doubt in result.doubts} == {"load_dependent_friction@swing"}
+    assert "friction of swing grows with what it carries" in verdict(result)

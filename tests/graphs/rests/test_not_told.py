@@ -53,7 +53,7 @@ def test_joints_that_stood_all_the_time_are_told_with_what_to_do(tmp_path):
     stood = replace(hanging(60, 1), moved=np.zeros((60, 1), dtype=bool))
     said = verdict(calibrate_rests(springs, [stood]))
     assert said.startswith("Usable, with reservations: swing never moved")
-    assert verdict(calibrate_rests(springs, [hanging(60, 1)])) == "Yes, the model holds at these rests."
+    assert verdict(calibrate_rests(springs, [hanging(60, 1)])).startswith("Yes, the model holds at these rests")
 
 
 def test_few_rests_from_one_side_are_no_yes_though_nothing_contradicts_them(tmp_path):
@@ -116,3 +116,27 @@ def test_without_weights_nothing_is_said_of_loads(tmp_path):
     free = rests.u - 0.5 * rests.forces[:, :1] * np.cos(rests.q_motor)
     result = calibrate_rests(lever(tmp_path, rigid=True), [replace(rests, u=free, forces=0.0 * rests.forces)])
     assert [each.label for each in result.unnoticed] == ["link_mass@swing"] and "loads by" not in verdict(result)
+
+
+def test_springs_say_how_far_all_weights_may_be_off_together(tmp_path):
+    robot, rests = lever(tmp_path), hanging(60, 1)
+    result = calibrate_rests(robot, [rests])
+    mass, load, together = result.unnoticed
+    assert (mass.label, load.label, together.label) == ("link_mass@swing", "load_scale@robot", "weights@robot")
+    assert max(mass.share, load.share) < 0.01 < together.share < 0.1  # a spring tells weights from each other
+    assert f"one share of up to {100.0 * together.share:.1f} % would not show" in verdict(result)
+    share, path = 0.4 * together.share, robot.tree.urdf
+    text = path.read_text(encoding="utf-8").replace('<mass value="2"', f'<mass value="{2.0 * (1.0 + share):.6f}"')
+    path.write_text(text, encoding="utf-8")
+    heavier = calibrate_rests(load_robot(robot.path), [replace(rests, forces=(1.0 + share) * rests.forces)])
+    assert verdict(heavier).startswith("Yes, the model holds at these rests") and share > 0.005
+    before, after = (
+        next(p for p in each.parameters if p.name == "swing.stiffness").value for each in (result, heavier)
+    )
+    assert after / before == pytest.approx(1.0 + share, rel=0.002)
+
+
+def test_rests_that_contradict_as_they_are_hide_nothing_more(tmp_path):
+    rests = hanging(60, 1)
+    result = calibrate_rests(lever(tmp_path), [replace(rests, forces=1.01 * rests.forces)])
+    assert {u.label: u.share for u in result.unnoticed}["load_scale@robot"] == 0.0

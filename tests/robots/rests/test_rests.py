@@ -21,12 +21,12 @@ ROBOT = load_robot("biorob")
 RATE = 100.0
 
 
-def recording(q_motor, q_link=None, u=None):
-    """A recording whose joints 2 to 4 stand at zero; arguments of joint 1, shape (k,)."""
+def recording(q_motor, q_link=None, u=None, others=0.0):
+    """A recording whose joints 2 to 4 stand at zero, or their links `others` beside it; arguments of joint 1."""
     times = np.arange(len(q_motor)) / RATE
     rest = np.zeros((len(times), 3))
     motor = np.column_stack([q_motor, rest])
-    link = np.column_stack([q_motor * 0.3 if q_link is None else q_link, rest])
+    link = np.column_stack([q_motor * 0.3 if q_link is None else q_link, rest + others])
     command = np.column_stack([np.zeros(len(times)) if u is None else u, rest])
     streams = {
         "command": Stream("command", times, command, ("a", "b", "c", "d"), "V"),
@@ -183,3 +183,10 @@ def test_links_that_move_on_while_motors_and_load_stand_are_told():
     (notice,) = [notice for notice in rests.notices if "moves on steadily" in notice.text]
     assert "in 3 of 3 a link moves on steadily" in notice.text and "/load does not say" in notice.text
     assert not find_rests(recording(motor, 0.3 * motor), ROBOT, LoadHistory.none()).notices
+
+
+def test_links_that_another_motor_takes_along_as_it_creeps_are_no_load_that_changes():
+    motor = creeping(1e-3)
+    carried = 5.0 * np.clip(motor - 0.4, 0.0, 1.5e-3)  # the weight moves that these carry
+    rests = find_rests(recording(motor, 0.3 * motor, others=carried[:, None]), ROBOT, LoadHistory.none())
+    assert rests.creep[:, 0].max() > 9e-4 and not rests.notices

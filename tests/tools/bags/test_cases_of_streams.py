@@ -13,7 +13,7 @@ from jointscope.graphs.calibration.calibrate import calibrate
 from jointscope.graphs.fixed_lag.replay.replay import replay
 from jointscope.robots.files.robot_file import load_robot
 from jointscope.robots.recordings.screening import screen
-from jointscope.tools.bags.describe_bag import describe_bag
+from jointscope.tools.bags.descriptions.describe_bag import describe_bag
 from jointscope.tools.bags.read_arrivals import ArrivalReader
 from jointscope.tools.bags.read_recording import read_recording
 

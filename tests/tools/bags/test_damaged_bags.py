@@ -7,7 +7,7 @@ import pytest
 from jointscope.robots.errors import RecordingError
 from jointscope.robots.files.robot_file import load_robot
 from jointscope.robots.recordings.recording import Recording, Stream
-from jointscope.tools.bags.describe_bag import describe_bag
+from jointscope.tools.bags.descriptions.describe_bag import describe_bag
 from jointscope.tools.bags.needed_streams import needed_streams
 from jointscope.tools.bags.read_recording import read_recording
 from jointscope.tools.bags.write_bag import write_bag

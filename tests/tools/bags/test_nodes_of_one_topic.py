@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from arm_bags import ArmMotion, write_arm_bag, write_urdf
 
-from jointscope.tools.bags.describe_bag import describe_bag
+from jointscope.tools.bags.descriptions.describe_bag import describe_bag
 
 
 @pytest.fixture(scope="module")

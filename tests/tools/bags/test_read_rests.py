@@ -111,6 +111,9 @@ def test_stamps_and_forces_are_understood(bench):
         (("time,link,mass", "0,attachment,heavy"), "line 2, column mass: expected a number, got 'heavy'"),
         (("time,link,mass", "5e5,attachment,1"), "line 2: a load at 500000 s, but the recording lasts from 0 to"),
         (("time,link,mass", "1,attachment,1", "1,attachment,2"), "two loads at 1 s; one holds until the next"),
+        (("time;link;mass", "0;attachment;1,5"), "semicolons stand between the cells; expected commas, and points"),
+        (("time\tlink\tmass", "0\tattachment\t1"), "tabs stand between the cells; expected commas"),
+        (("time,link,mass", "0,attachment,1,5"), "line 2 has 4 cells, the first line 3; expected as many, and points"),
         (("time,link,mass",), "expected a line with the names of the columns and one per load, got 1 lines"),
     ],
 )

@@ -19,6 +19,7 @@ from jointscope.robots.rests.angle_units import check_angle_units
 from jointscope.robots.rests.load_history import LoadHistory
 from jointscope.robots.rests.rests import Rests, find_rests
 from jointscope.tools.bags.at_poses.load_table import check_loads, loads_beside, loads_from_table
+from jointscope.tools.bags.errors_of import errors_of
 from jointscope.tools.bags.load_topic import LOAD, LOAD_TYPE, load_messages
 from jointscope.tools.bags.read_recording import read_recording
 
@@ -35,8 +36,9 @@ def read_rests(path: str | Path, robot: Robot) -> Rests:
             loads that cannot hang on this robot.
     """
     robot.need_link_dynamics()
-    recording = read_recording(path, robot)
-    check_angle_units(recording, robot)
+    with errors_of(path):
+        recording = read_recording(path, robot)
+        check_angle_units(recording, robot)
     mistake = mistaken_transmission(recording, robot)
     odd = () if mistake is None else (Notice("transmission", "info", 0, mistake.sentence(robot)),)
     table = loads_beside(Path(path))

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from jointscope.robots.errors import RecordingError
 
 Array = NDArray[np.float64]
+SEPARATORS = {";": "semicolons", "\t": "tabs"}
 
 
 @dataclass(frozen=True)
@@ -49,10 +50,18 @@ class Table:
             raise RecordingError(
                 f"{path}: expected a line with the names of the columns and one per {row}, got {len(rows)} lines"
             )
+        apart = next((name for mark, name in SEPARATORS.items() if len(rows[0]) == 1 and mark in rows[0][0]), None)
+        if apart:
+            raise RecordingError(
+                f"{path}: {apart} stand between the cells; expected commas, and points in numbers: export it as such"
+            )
         head, body = [cell.strip() for cell in rows[0]], [line for line in rows[1:] if any(c.strip() for c in line)]
         wrong = next((i for i, line in enumerate(body) if len(line) != len(head)), None)
         if wrong is not None:
-            raise RecordingError(f"{path}: line {wrong + 2} has {len(body[wrong])} cells, the first line {len(head)}")
+            raise RecordingError(
+                f"{path}: line {wrong + 2} has {len(body[wrong])} cells, the first line {len(head)}; expected as many, "
+                "and points in numbers, not commas"
+            )
         return Table(path, text, head, body)
 
     def numbers(self, columns: Sequence[int]) -> Array:

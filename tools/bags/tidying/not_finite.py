@@ -130,9 +130,12 @@ def _check_shares(name: str, channels: tuple[str, ...], samples: TimedSamples, b
         too_many |= scattered or rows.sum() > MOST * n
     if too_many:
         since = (samples.stamps[int(np.argmax(bad.any(axis=1)))] - samples.stamps[0]) / 1e9
+        lacking = int(np.count_nonzero(bad.any(axis=1)))
+        count = lacking if name == COMMAND else int(counts[worst])
+        what = channels[worst] if count == counts[worst] else f"a command, most often {channels[worst]},"
         raise RecordingError(
-            f"{channels[worst]} is no number (NaN or infinite) in {counts[worst]} of {n} messages "
-            f"({100 * counts[worst] / n:.3g} %), the first at {since:.3f} s; expected at most {_expected(name)}: "
+            f"{what} is no number (NaN or infinite) in {count} of {n} messages "
+            f"({100 * count / n:.3g} %), the first at {since:.3f} s; expected at most {_expected(name)}: "
             f"{_way_out(name, scattered)}"
         )
 

@@ -8,7 +8,8 @@ from scipy.stats import binom
 
 from jointscope.graphs.rests.doubts import LIKELY
 from jointscope.graphs.rests.seen_rests import SeenRests
-from jointscope.graphs.rests.taken_for_granted import LOAD, MASS
+from jointscope.graphs.rests.taken_for_granted import LOAD, MASS, all_rigid
+from jointscope.graphs.rests.unnoticed import WEIGHTS
 from jointscope.tools.bags.clocks.durations import counted
 from jointscope.tools.presentation.numbers import significant
 
@@ -64,9 +65,12 @@ def open_gains(seen: SeenRests) -> str:
 
 def unchecked(seen: SeenRests) -> str:
     """Masses and loads that might be wrong by more than is usual without a contradiction, and what rests on them."""
-    parts = []
+    parts, scale = list[str](), ""
     for each in seen.unnoticed:
         effect, _, owner = each.label.partition("@")
+        if each.label == WEIGHTS:
+            scale = _on_one_scale(each.share)
+            continue
         loads, all_of_it = effect == "load_scale", np.isinf(each.share)
         if each.share > (LOAD if loads else MASS):
             share = f"up to {_percent(each.share)}" if loads else f"up to {significant(each.size, 2)} kg"
@@ -75,13 +79,24 @@ def unchecked(seen: SeenRests) -> str:
             parts.append(f"{what} by {'anything' if all_of_it else share}")
     gains = any(p.name.rpartition(".")[2] == seen.robot.drive_gain for p in seen.parameters)
     said = [
-        "Friction is known; masses and loads are those of the URDF and of /load, and these rests would not show it "
+        scale,
+        f"{'Friction is known; masses' if all_rigid(seen.robot) else 'Masses'} and loads are those of the URDF and of "
+        "/load, and these rests would not show it "
         f"if one of them were off alone: {', '.join(parts)}" * bool(parts),
         "Torque constants are on the scale of masses and loads: all of these off by one share would not show"
         * (gains and bool(seen.unnoticed)),
         "More postures and weights, with every joint moved before each rest, show more" * bool(parts),
     ]
     return ". ".join(filter(None, said))
+
+
+def _on_one_scale(share: float) -> str:
+    """What all weights off by one share would do to springs, whose sigmas know nothing of it."""
+    by = "any share" if np.isinf(share) else f"one share of up to {_percent(share)}"
+    return (
+        f"Springs and friction are on the scale of masses and loads: all of these off by {by} would not show, and "
+        "change springs by as much"
+    )
 
 
 def _percent(share: float) -> str:

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 
@@ -13,9 +14,12 @@ from jointscope.robots.errors import RecordingError
 from jointscope.robots.model.robot import Robot
 from jointscope.robots.recordings.resting_joints import must_move
 from jointscope.robots.units import joined
-from jointscope.tools.bags.bag_description import BagDescription, NeedDescription, TopicDescription
+from jointscope.tools.bags.at_poses.read_rests import read_rests
+from jointscope.tools.bags.descriptions.bag_description import BagDescription, NeedDescription, TopicDescription
+from jointscope.tools.bags.load_topic import largest_load
 from jointscope.tools.bags.messages.open_bag import Bag
 from jointscope.tools.bags.needed_streams import check_topic, full_type_name, needed_streams
+from jointscope.tools.bags.read_motion import rests_in
 from jointscope.tools.bags.read_recording import read_recording
 
 
@@ -28,7 +32,7 @@ def for_robot(described: BagDescription, bag: Bag, robot: Robot) -> BagDescripti
         robot: what to compare it with.
     """
     needs = _needs(bag, robot, {topic.topic: topic for topic in described.topics})
-    problem, notices = _judge(described.path, robot, needs)
+    problem, notices, of_rests = _judge(described.path, robot, needs)
     return replace(
         described,
         robot=robot.name,
@@ -36,6 +40,7 @@ def for_robot(described: BagDescription, bag: Bag, robot: Robot) -> BagDescripti
         usable=problem is None,
         problem=problem,
         notices=notices,
+        rests=of_rests,
         transmission=_transmission(robot),
     )
 
@@ -75,15 +80,20 @@ def _needs(bag: Bag, robot: Robot, topics: dict[str, TopicDescription]) -> tuple
     return tuple(needs)
 
 
-def _judge(path: str, robot: Robot, needs: tuple[NeedDescription, ...]) -> tuple[str | None, tuple[str, ...]]:
-    """Why the recording cannot be used for a robot, and what was odd."""
+def _judge(
+    path: str, robot: Robot, needs: tuple[NeedDescription, ...]
+) -> tuple[str | None, tuple[str, ...], int | None]:
+    """Why the recording cannot be used for a robot, what was odd, and how many rests it has if it is one of these."""
     missing = [need.stream for need in needs if need.problem is not None]
     if missing:
-        return f"{', '.join(missing)} cannot be read", ()
+        return f"{', '.join(missing)} cannot be read", (), None
     try:
         recording = read_recording(path, robot)
+        if largest_load(Path(path)) > 0.0 or rests_in(recording, robot)[1]:
+            rests = read_rests(path, robot)
+            return None, tuple(notice.text for notice in rests.notices), len(rests)
     except RecordingError as err:
-        return str(err), ()
+        return str(err), (), None
     notices = recording.notices
     try:
         notices = [*notices, *screen_all(recording, robot)]
@@ -91,4 +101,4 @@ def _judge(path: str, robot: Robot, needs: tuple[NeedDescription, ...]) -> tuple
         must_move(robot, [recording])
     except RecordingError as err:
         problem = str(err)
-    return problem, tuple(notice.text for notice in notices)
+    return problem, tuple(notice.text for notice in notices), None

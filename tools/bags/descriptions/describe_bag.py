@@ -10,11 +10,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from jointscope.robots.errors import RecordingError
-from jointscope.tools.bags.bag_description import BagDescription, FieldDescription, TopicDescription
 from jointscope.tools.bags.clocks.clock_steps import on_one_clock
 from jointscope.tools.bags.clocks.time_order import in_time_order
 from jointscope.tools.bags.clocks.timed_samples import TimedSamples
 from jointscope.tools.bags.clocks.unfilled_stamps import without_unfilled
+from jointscope.tools.bags.descriptions.bag_description import BagDescription, FieldDescription, TopicDescription
 from jointscope.tools.bags.fitting_messages import left_out_notices, read_columns
 from jointscope.tools.bags.messages.columns import Columns
 from jointscope.tools.bags.messages.message_type import MessageType, inner_type
@@ -65,7 +65,9 @@ def describe_bag(path: str | Path, robot: Robot | None = None, progress: Progres
         )
         if robot is None:
             return described
-        from jointscope.tools.bags.bag_for_robot import for_robot  # the equations of motion behind it cost time
+        from jointscope.tools.bags.descriptions.bag_for_robot import (
+            for_robot,  # the equations of motion behind it cost time
+        )
 
         return for_robot(described, bag, robot)
 

@@ -8,6 +8,8 @@ from collections.abc import Sequence
 from dataclasses import asdict, dataclass, field
 from typing import Any
 
+from jointscope.tools.bags.clocks.durations import counted
+
 
 @dataclass(frozen=True)
 class FieldDescription:
@@ -102,6 +104,7 @@ class BagDescription:
         needs: what that robot needs.
         usable: whether the recording can be used for that robot; None without one.
         problem: why not.
+        rests: how many it has for that robot, if it is a recording of these; None of motion.
         notices: what was dropped or looked odd, for that robot.
         transmission: joint angles per motor angle of that robot, row by row; None where each motor moves its own.
     """
@@ -116,6 +119,7 @@ class BagDescription:
     needs: tuple[NeedDescription, ...] = ()
     usable: bool | None = None
     problem: str | None = None
+    rests: int | None = None
     notices: tuple[str, ...] = field(default_factory=tuple)
     transmission: tuple[tuple[float, ...], ...] | None = None
 
@@ -157,7 +161,8 @@ class BagDescription:
             lines += [f"    {row}" for row in _table([tuple(f"{v:.6g}" for v in row) for row in self.transmission])]
         lines += [f"note: {notice}" for notice in self.notices]
         if self.usable:
-            lines.append(f"The recording can be used for {self.robot}.")
+            how = "" if self.rests is None else f" as one of rests (--rests): {counted(self.rests, 'rest')}"
+            lines.append(f"The recording can be used for {self.robot}{how}.")
         else:
             lines.append(f"The recording cannot be used for {self.robot}: {self.problem}")
         return lines
