@@ -136,7 +136,8 @@ def run(args: argparse.Namespace) -> int:
     print("\n\n".join([*coupling_lines(coupling), calibration_text(result, judgement)]))
     files.tell(args.urdf)
     if judgement.level != "good":
-        words = [bag_arguments([args.output]), recording_arguments(recordings), *effects_words(args.effects)]
+        beside = [f"--{kind} {bag_arguments(paths)}" for kind, paths in kinds.items() if paths]
+        words = [bag_arguments([args.output]), recording_arguments(recordings), *beside, *effects_words(args.effects)]
         print(f"What it may lack: jointscope diagnose {' '.join(words)} --report diagnosis.html")
     return print_acceptance(result.acceptance)
 

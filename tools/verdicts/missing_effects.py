@@ -6,6 +6,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from jointscope.graphs.calibration.calibration_result import CalibrationResult
+from jointscope.graphs.rests.rests_beside_motion import seen_rests
 from jointscope.graphs.scoring.lacking_effects import AS_SURE, LackingEffect
 from jointscope.graphs.scoring.regression.load_friction import LoadFriction
 from jointscope.graphs.scoring.regression.regressed_causes import RegressedCause
@@ -21,7 +22,7 @@ from jointscope.graphs.scoring.regression.unsteady_gains import (
     UnsteadyGain,
 )
 from jointscope.robots.files.effect_catalogue import catalogue
-from jointscope.robots.model.command_words import edited_argument, robot_argument
+from jointscope.robots.model.command_words import bag_arguments, edited_argument, robot_argument
 from jointscope.tools.presentation.left_out import recording_arguments
 from jointscope.tools.presentation.numbers import significant
 from jointscope.tools.verdicts.given_recordings import given
@@ -179,6 +180,8 @@ def _discover(result: CalibrationResult) -> str:
         held = f"{recording_arguments(recordings[:-1])} --holdout {recording_arguments(recordings[-1:])}"
     else:
         held = f"{recording_arguments(recordings)} --holdout-share 0.33"
+    if seen := seen_rests(result):
+        held += f" --rests {bag_arguments(problem.rests.path for problem in seen.problems)}"
     return f"jointscope discover {robot_argument(start)} {held} -o {edited_argument(start, 'better')}"
 
 

@@ -21,6 +21,7 @@ from jointscope.tools.verdicts.given_recordings import given
 
 CONSTANT = "torque_constant"
 MASSES = (0.05, 0.25)  # share by which one N m of the command may be off: fine up to the first, bad beyond the second
+SURER = 2.0  # times as small is the logarithm of the p-value of an effect that is said in place of a mass
 SURE = 3.5  # [sigma]
 ALIKE = 0.1  # share by which constants of drives may differ that are one number, in spite of wrong moments
 STRONGEST = 500.0  # [N m/A] behind the largest gears of industrial robots
@@ -134,10 +135,11 @@ def _load(result: CalibrationResult, constants: list[ParameterEstimate]) -> tupl
     """One link that weighs something else: what that would change is wrong by as much."""
     # to one linear step these look like masses
     named = result.asked.causes or result.asked.gains or given(result)
+    effects = [effect for effect in result.lacking if effect.moved(result.found)]
     for mass in () if named else result.masses:
         shares = mass.moved(result.found)
-        if not shares:
-            continue
+        if not shares or any(effect.p_value <= mass.p_value**SURER for effect in effects):
+            continue  # a spring that hardens weighs something, too, in a model that lacks it
         if abs(mass.mass) < SURE * mass.sigma:
             return "bad", _another_place(result, mass.joint)
         worst = max(shares, key=lambda name: abs(shares[name]))

@@ -14,6 +14,7 @@ from fake_results import fake_calibration
 
 from jointscope.graphs.calibration.calibrate import calibrate
 from jointscope.graphs.calibration.calibration_result import ParameterEstimate
+from jointscope.graphs.scoring.lacking_effects import LackingEffect
 from jointscope.graphs.scoring.wrong_masses import WrongMass
 from jointscope.graphs.starts.second_opinion import regressed_values
 from jointscope.robots.bodies.possible_masses import impossible_masses
@@ -179,6 +180,17 @@ def test_a_wrong_mass_must_be_sure_and_must_matter(arm, tmp_path, p_value, chang
     assert found == level
     if level == "bad":
         assert "elbow.torque_constant would be +5 %" in text and re.search(r"jointscope init \S*/other.urdf ", text)
+
+
+@pytest.mark.parametrize(("p_value", "level"), [(1e-20, "good"), (1e-9, "bad")])
+def test_an_effect_that_is_far_surer_than_a_mass_is_said_in_its_place(arm, tmp_path, p_value, level):
+    robot = begun(arm, tmp_path, 1.0, None, "--unit", "A")
+    constant = "elbow.torque_constant"
+    heavy = doubted(robot, 8.0, 0.01, WrongMass("elbow", 0.3, 0.02, 1e-8, {constant: 0.4}))
+    hardens = LackingEffect("spring_cubic", "elbow", p_value, 100.0, {constant: 7.0})
+    assert plausible_torques(dataclasses.replace(heavy, lacking=(hardens,)))[0] == level
+    same = dataclasses.replace(hardens, with_it={constant: 8.0})  # and changes no value
+    assert plausible_torques(dataclasses.replace(heavy, lacking=(same,)))[0] == "bad"
 
 
 @pytest.mark.parametrize(
