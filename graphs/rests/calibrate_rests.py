@@ -22,6 +22,7 @@ from jointscope.graphs.rest_sets.rest_set import EDGE, RestSet
 from jointscope.graphs.rest_sets.settling import settled
 from jointscope.graphs.rests.band_posterior import band_posterior
 from jointscope.graphs.rests.doubts import AskedOfRests, Doubt
+from jointscope.graphs.rests.followers import with_followers
 from jointscope.graphs.rests.rests_by_values import SaidElsewhere
 from jointscope.graphs.rests.seen_rests import SeenRests
 from jointscope.graphs.rests.unheard_speeds import as_given, with_priors, without_motion
@@ -149,6 +150,7 @@ def calibrate_rests(
     whole = RestSet.joined(problems)
     said = _said_beside(whole, x, likeliest, beside, solution) if beside else None
     calibration, covariance = band_posterior(whole, robot, x, likeliest, said)
+    calibration = calibration if beside else with_followers(whole, robot, x, likeliest, calibration)
     sigmas, scale = np.sqrt(np.diag(covariance)), calibration.value_by_coordinate
     table = dynamic_parameters(robot, calibration, sigmas)
     priors = np.array([robot.parameters[p.name].coordinate_sigma for p in table])
