@@ -13,7 +13,7 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class LoadHistory:
-    """A known force on the arm over time; each holds until the next.
+    """A known force on the arm over time; each holds until the next, and before the first nothing hangs there.
 
     Attributes:
         times: shape (k,) [s].
@@ -32,10 +32,11 @@ class LoadHistory:
 
     @property
     def changes(self) -> Array:
-        """Times at which another force begins [s]."""
+        """Times at which another force begins [s], the first one of a recording among them."""
+        first = self.times[:1][np.any(self.forces[:1] != 0.0, axis=1) & (self.times[:1] > 0.0)]
         other = np.any(np.diff(self.forces, axis=0) != 0.0, axis=1)
         other |= np.array([a != b for a, b in zip(self.links[1:], self.links[:-1], strict=True)], dtype=bool)
-        return self.times[1:][other]
+        return np.append(first, self.times[1:][other])
 
     def at(self, time: float) -> tuple[Array, str]:
         """Force and link at a time."""

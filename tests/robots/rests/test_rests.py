@@ -71,6 +71,15 @@ def test_a_load_that_changes_ends_a_rest_and_a_motor_that_stood_has_not_moved():
     assert rests.times[0, 1] <= 2.0 <= rests.times[1, 0] and not rests.moved.any()
 
 
+@pytest.mark.parametrize(("begins", "forces"), ((2.0, [0.0, 1.5]), (0.0, [1.5]), (-3.0, [1.5]), (0.2, [1.5])))
+def test_the_first_load_hangs_from_its_time_on_and_nothing_before(begins, forces):
+    loads = LoadHistory(np.array([begins]), np.array([[0.0, 1.5, 0.0]]), ("attachment",))
+    rests = find_rests(recording(np.zeros(400)), ROBOT, loads)
+    np.testing.assert_array_equal(rests.forces[:, 1], forces)
+    if begins == 2.0:
+        assert rests.times[0, 1] <= 2.0 <= rests.times[1, 0] and rests.links == ("", "attachment")
+
+
 def test_rests_alike_in_a_row_are_one_the_last():
     motor = steps(0.0, 0.4)
     blip = motor.copy()
