@@ -23,6 +23,7 @@ from jointscope.graphs.rests.doubts import AskedOfRests
 from jointscope.graphs.rests.rests_by_values import SaidElsewhere
 from jointscope.graphs.rests.seen_rests import SeenRests
 from jointscope.graphs.solving.batch_solver import Progress
+from jointscope.graphs.solving.solver_context import in_solver_context
 from jointscope.graphs.starts.spring_knots import with_knots
 from jointscope.robots.model.robot import Robot
 from jointscope.robots.parts.parameter import with_sigmas
@@ -30,6 +31,7 @@ from jointscope.robots.recordings.recording import Recording
 from jointscope.robots.rests.rests import Rests
 
 
+@in_solver_context
 def weighted_rests(
     robot: Robot, recordings: Sequence[Recording], rests: Sequence[Rests], progress: Progress
 ) -> tuple[Robot, list[RestSet]]:
@@ -52,6 +54,7 @@ def weighted_rests(
     return robot, settled_rests(robot, rests, progress)[0]
 
 
+@in_solver_context
 def with_rests(result: CalibrationResult) -> CalibrationResult:
     """The result with the posterior of its rests and what they say; as it is without rests.
 

@@ -13,6 +13,7 @@ import pytest
 from lever_bench import C0, hanging, lever
 
 from jointscope import calibrate, simulate
+from jointscope.graphs.rests import rests_beside_motion as beside
 from jointscope.graphs.rests.calibrate_rests import calibrate_rests, settled_rests
 from jointscope.graphs.rests.rests_beside_motion import seen_rests
 from jointscope.tools.verdicts.judgement import judge
@@ -65,3 +66,10 @@ def test_joints_that_stood_at_all_rests_are_told_beside_motion(rod):
 def test_without_rests_nothing_is_said_of_them(rod):
     result = calibrate(*rod)
     assert seen_rests(result) is None and not any("Rests" in check.name for check in judge(result).checks)
+
+
+def test_steps_that_are_tried_and_fail_warn_nobody(rod, monkeypatch):
+    said = []
+    monkeypatch.setattr(beside, "settled_rests", lambda *args: [said.append(np.geterr())])
+    beside.weighted_rests(rod[0], [rod[1]], [hanging(10, 3, rigid=True)], lambda text, share: None)
+    assert set(said[0].values()) == {"ignore"}
