@@ -12,6 +12,7 @@ from __future__ import annotations
 import numpy as np
 
 from jointscope.graphs.calibration.calibration_result import CalibrationResult, ParameterEstimate
+from jointscope.graphs.rests.rests_beside_motion import seen_rests
 from jointscope.graphs.scoring.regression.wrong_links import WrongLink
 from jointscope.graphs.starts.drive_regression import Value
 from jointscope.robots.bodies.possible_masses import impossible_masses
@@ -60,7 +61,7 @@ def _nothing(constants: list[ParameterEstimate]) -> str:
 def _scale(result: CalibrationResult, constants: list[ParameterEstimate]) -> tuple[str, str] | None:
     """Masses of links that are calibrated beside torque constants: what is left of the URDF sets the scale of both."""
     masses = [here.label for here in result.robot.effects if here.effect.id == "link_mass"]
-    if not masses or not constants:
+    if not masses or not constants or _known_loads(result):
         return None
     return "bad", (
         f"{', '.join(masses)} and the torque constants are told by the same weights: a load at another place than the "
@@ -68,6 +69,12 @@ def _scale(result: CalibrationResult, constants: list[ParameterEstimate]) -> tup
         f"{CONSTANT} in {result.start.path.name}, then calibrate again; or correct the masses of "
         f"{result.robot.tree.urdf.name}."
     )
+
+
+def _known_loads(result: CalibrationResult) -> bool:
+    """Whether rests beside the motion carried loads that are known: these set the scale of drives and links."""
+    seen = seen_rests(result)
+    return seen is not None and any(bool(np.any(problem.rests.forces)) for problem in seen.problems)
 
 
 def _wrong_link(result: CalibrationResult, link: WrongLink) -> str:

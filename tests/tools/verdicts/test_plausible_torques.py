@@ -6,6 +6,7 @@ from __future__ import annotations
 import dataclasses
 import re
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -14,6 +15,7 @@ from fake_results import fake_calibration
 
 from jointscope.graphs.calibration.calibrate import calibrate
 from jointscope.graphs.calibration.calibration_result import ParameterEstimate
+from jointscope.graphs.rests.seen_rests import SeenRests
 from jointscope.graphs.scoring.lacking_effects import LackingEffect
 from jointscope.graphs.scoring.wrong_masses import WrongMass
 from jointscope.graphs.starts.second_opinion import regressed_values
@@ -180,6 +182,18 @@ def test_a_wrong_mass_must_be_sure_and_must_matter(arm, tmp_path, p_value, chang
     assert found == level
     if level == "bad":
         assert "elbow.torque_constant would be +5 %" in text and re.search(r"jointscope init \S*/other.urdf ", text)
+
+
+@pytest.mark.parametrize(("load", "level"), [(None, "bad"), (0.0, "bad"), (9.81, "good")])
+def test_known_loads_at_rest_set_the_scale_of_masses_and_torque_constants(arm, tmp_path, load, level):
+    robot = begun(arm, tmp_path, 1.0, None, "--unit", "A")
+    path = tmp_path / "heavier.yaml"
+    assert main(["add", str(robot.path), "link_mass@elbow", "-o", str(path)]) == 0
+    result = doubted(load_robot(path), 8.0, 0.01, WrongMass("elbow", 0.3, 0.02, 0.5, {}))
+    if load is not None:
+        rests = SimpleNamespace(rests=SimpleNamespace(forces=np.array([[0.0, 0.0, -load]])))
+        result = dataclasses.replace(result, rests=SeenRests(robot, robot, [rests], (), None, (), ()))
+    assert plausible_torques(result)[0] == level
 
 
 @pytest.mark.parametrize(("p_value", "level"), [(1e-20, "good"), (1e-9, "bad")])
