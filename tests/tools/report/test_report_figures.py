@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import re
 from pathlib import Path
 from xml.etree import ElementTree
@@ -12,10 +13,12 @@ from fake_diagnosis import fake_diagnosis, fake_discovery
 from fake_results import fake_calibration, fake_comparison
 
 from jointscope.robots.errors import JointscopeError
+from jointscope.robots.files.robot_file import load_robot
 from jointscope.tools.report import calibration_report, comparison_report, diagnosis_report, discovery_report
 from jointscope.tools.report.page.page import Key
 from jointscope.tools.report.page.report_figures import report_figures
 from jointscope.tools.report.page.stacked import stacked
+from jointscope.tools.report.sections.calibration.states import states
 from jointscope.tools.report.story_picture import story_picture
 from jointscope.tools.verb_parts.result_files import ResultFiles, write_comparison
 
@@ -94,3 +97,11 @@ def test_the_picture_of_a_story_says_what_it_shows_to_those_who_hear_it():
     assert "step by step" in outer.attrib["aria-label"]
     kept = ElementTree.parse(Path(__file__).parents[3] / "docs" / "pictures" / "story.svg").getroot()
     assert kept.attrib["aria-label"] == outer.attrib["aria-label"]
+
+
+@pytest.mark.parametrize(
+    ("robot", "said"), (("doggy", "No encoder sees the links"), ("biorob", "Encoders see the links"))
+)
+def test_what_sees_the_links_is_said_of_the_states(robot, said):
+    result = dataclasses.replace(fake_calibration(0.2), robot=load_robot(robot), bags=())
+    assert said in states(result).lead

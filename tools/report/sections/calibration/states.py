@@ -38,9 +38,11 @@ def states(result: CalibrationResult) -> Section:
             + figure(_sigmas(bag, result.robot, whole), keys, group=group)
         )
 
+    seen = result.robot.link_encoder is not None
+    how = ("No encoder sees", "infers them from"), ("Encoders see", "weighs them against")
     lead = (
-        "No sensor sees the links directly; the smoother infers them. The deflection q_link − q_motor is what the "
-        "springs feel."
+        f"{how[seen][0]} the links; the smoother {how[seen][1]} the dynamics. The deflection q_link − q_motor is what "
+        "the springs feel."
     )
     return Section("states", "States and their sigmas", per_bag(result, draw), lead)
 
