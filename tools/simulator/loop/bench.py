@@ -29,7 +29,8 @@ EVERY = 5  # ticks from one command to the next
 PERIOD = EVERY * TICK  # [s]
 SERVO, FASTEST = 2.0 * np.pi * 3.0, 2.0 * np.pi * 5.0  # [rad/s] of the position controller, and what it may be
 STOPS = 0.005  # of a joint's range within which the motor stops: the controller is stiff enough for that
-SLOW = 0.05  # of a joint's range per second, below which the controller no longer pushes against friction
+AHEAD = 0.9  # of the dry friction that the controller knows, in the direction in which a motor has moved last
+TURNS = 0.2  # of a move, in which the controller takes the new direction for it
 DIFFERENCE = 20  # ticks between the angles of which a speed is made
 BEGIN = 0.2  # [s] before the first move, too short for a rest
 HAND, STEP = 1.0, 4  # [s] that a hand takes to hang a weight at least, and commands from one step of it to the next
@@ -124,13 +125,13 @@ class Bench:
             [robot.drive_parameter(j, "k_mi").value if "k_mi" in robot.drive_laws else 0.0 for j in robot.joints]
         )
         self._own_damping = own
-        self._slow = SLOW * reach
         self._damp = np.maximum(2.0 * np.sqrt(self._stiff * holding.inertia) - own, 0.0)
         links = robot.link_encoder
         self._still = CALM * np.concatenate([robot.motor_encoder.sigmas, () if links is None else links.sigmas])
         self._seen = engine.motor if links is None else np.concatenate([engine.motor, engine.link])
         self._target, self._rate = holding.motors(self.start), np.zeros(robot.n)
         self._weight, self._shift = holding.torques(self.start), np.zeros(robot.n)
+        self._way = np.zeros(robot.n)
         self._readings: list[Array] = []
         self._now, self._past = 0.0, Trajectory(TICK, np.zeros((1, 1)), np.zeros((1, 1)))
         self._command = np.zeros(robot.n)
@@ -152,7 +153,7 @@ class Bench:
         v = (q - before) / (PERIOD * min(max(len(self._readings) - 1, 1), DIFFERENCE // EVERY))
         holding = self._holding
         torque = self._weight + self._shift + self._stiff * (self._target - q) + self._damp * (self._rate - v)
-        torque += self._own_damping * self._rate + holding.dry * np.tanh(self._rate / self._slow)
+        torque += self._own_damping * self._rate + AHEAD * holding.dry * self._way
         self._command = np.clip(torque, -holding.most, holding.most) / holding.gains
         self.commands.append(self._command)
         return self._command
@@ -182,6 +183,7 @@ class Bench:
     def _move(self, a: Array, b: Array) -> Iterator[bool]:
         """A minimum-jerk move of all links together."""
         seconds, begin, began = self._holding.duration(a, b), self._shift.copy(), self._target
+        turned, there = self._way.copy(), np.sign(self._holding.motors(b) - self._holding.motors(a))
         steps = max(round(seconds / PERIOD), 1) if seconds else 0
         for k in range(1, steps + 1):
             s = k / steps
@@ -190,6 +192,7 @@ class Bench:
             self._rate = (target - began) / PERIOD
             self._target, began = target, target
             self._weight, self._shift = self._holding.torques(q), begin * (1.0 - s)
+            self._way = turned + (there - turned) * _smooth(min(s / TURNS, 1.0))
             yield True
         self._rate = np.zeros_like(a)
 
