@@ -115,7 +115,7 @@ def simulate_rests(
     conditions, resting = conditions or Conditions(), resting or Resting()
     told = progress or (lambda share: None)
     at = _link(robot, resting.at)
-    count = _checked(resting, conditions)
+    count = _checked(robot, resting, conditions)
     holding = Holding(true_robot(robot, conditions.parameters))
     forces = [mass * robot.tree.gravity for mass in resting.masses]
     postures = drawn_postures(holding, count, forces, at, random_stream(seed, session, "postures"))
@@ -164,7 +164,7 @@ def _link(robot: Robot, at: str | None) -> str:
     return max(behind, key=lambda name: float(np.linalg.norm(behind[name].placement.translation)))
 
 
-def _checked(resting: Resting, conditions: Conditions) -> int:
+def _checked(robot: Robot, resting: Resting, conditions: Conditions) -> int:
     """The number of postures.
 
     Raises:
@@ -176,6 +176,8 @@ def _checked(resting: Resting, conditions: Conditions) -> int:
         raise SimulationError(f"weights: expected masses of 0 kg or more, got {', '.join(map(str, resting.masses))}")
     if len(set(resting.masses)) < len(resting.masses):
         raise SimulationError(f"weights: expected each once, got {', '.join(f'{m:g}' for m in resting.masses)}")
+    if any(resting.masses) and not robot.tree.gravity.any():
+        raise SimulationError(f"{robot.name} has no gravity, so weights pull at nothing; leave out --weights")
     if not SHORTEST_HOLD <= resting.hold <= LONGEST_HOLD:
         raise SimulationError(f"hold: expected {SHORTEST_HOLD:g} to {LONGEST_HOLD:g} s, got {resting.hold:g}")
     if resting.count is not None and resting.count < 1:

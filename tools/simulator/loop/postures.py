@@ -160,6 +160,6 @@ def drawn_postures(
             return found
     heaviest = max(float(np.linalg.norm(force)) for force in forces)
     raise SimulationError(
-        f"drives and springs of {robot.name} hold {heaviest:.3g} N at {at} in {len(found)} of {TRIES * count} postures, "
-        f"expected {count}; give lighter --weights, another --at, or a smaller --count"
+        f"drives and springs of {robot.name} hold {heaviest:.3g} N at {at} in {len(found)} of {TRIES * count} "
+        f"postures, expected {count}; give lighter --weights, another --at, or a smaller --count"
     )

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""`simulate --kind rests`: a robot that is brought to rest, with known weights on a link; a bag and the truth beside it."""
+"""`simulate --kind rests`: a robot that is brought to rest, with known weights; a bag and its truth."""
 
 from __future__ import annotations
 
