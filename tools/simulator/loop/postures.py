@@ -28,7 +28,7 @@ LEAST, LONGER = 0.8, 0.8  # [s] of a move, and what one by half of all postures 
 CALMLY = 3.0  # periods of the slowest swing that a move, or a hand with a weight, takes at least
 PEAK = 1.875  # largest speed of a minimum-jerk move over its mean
 SPEED = 0.5  # of what the URDF allows
-TRIES = 400  # for each posture
+TRIES = 400  # for one posture
 
 
 @dataclass(frozen=True)
@@ -145,8 +145,9 @@ def drawn_postures(
         SimulationError: the drives cannot hold the arm with the heaviest weight anywhere.
     """
     robot, most = holding.robot, LIKE * holding.most
-    found: list[Posture] = []
-    for _ in range(TRIES * count):
+    found, tried = list[Posture](), 0
+    while tried < TRIES:
+        tried += 1
         q = holding.centre + holding.half * rng.uniform(-1.0, 1.0, robot.n)
         side = rng.choice([-1.0, 1.0], robot.n)
         before = q - side * holding.run
@@ -156,10 +157,11 @@ def drawn_postures(
             np.all(np.abs(holding.sag(load)) < BENT * holding.half) for load in loads
         ):
             found.append(Posture(q, before))
+            tried = 0
         if len(found) == count:
             return found
     heaviest = max(float(np.linalg.norm(force)) for force in forces)
     raise SimulationError(
-        f"drives and springs of {robot.name} hold {heaviest:.3g} N at {at} in {len(found)} of {TRIES * count} "
-        f"postures, expected {count}; give lighter --weights, another --at, or a smaller --count"
+        f"drives and springs of {robot.name} hold {heaviest:.3g} N at {at} in {len(found)} postures that were "
+        f"found, expected {count}; give lighter --weights, another --at, or a smaller --count"
     )
