@@ -15,8 +15,10 @@ from numpy.typing import NDArray
 from jointscope.robots.errors import RecordingError
 from jointscope.robots.model.robot import Robot
 from jointscope.robots.recordings.recording import Recording, Stream
+from jointscope.robots.rests.load_history import LoadHistory
+from jointscope.tools.bags.load_topic import LOAD, LOAD_TYPE
 from jointscope.tools.bags.messages.joined_topics import parts_of
-from jointscope.tools.bags.messages.message_template import fill_messages
+from jointscope.tools.bags.messages.message_template import blank_message, fill_messages
 from jointscope.tools.bags.messages.message_type import MessageType, known_message_type
 from jointscope.tools.bags.messages.open_bag import Progress, one_line, storage_files
 from jointscope.tools.bags.needed_streams import StreamSource, full_type_name, needed_streams
@@ -43,7 +45,12 @@ class TopicMessages:
 
 
 def write_bag(
-    path: str | Path, recording: Recording, robot: Robot, fmt: str | None = None, progress: Progress | None = None
+    path: str | Path,
+    recording: Recording,
+    robot: Robot,
+    fmt: str | None = None,
+    progress: Progress | None = None,
+    loads: LoadHistory | None = None,
 ) -> None:
     """Writes a bag.
 
@@ -53,12 +60,26 @@ def write_bag(
         robot: says topics, types, fields, units and joint names.
         fmt: "bag", "db3" or "mcap"; by default what the suffix says, and mcap for a folder.
         progress: called with the number of messages written and to be written.
+        loads: that hang on the robot, for the topic of known loads.
 
     Raises:
         RecordingError: the bag cannot be written; nothing is left behind.
     """
     ros2 = _format(Path(path), fmt) != "bag"
-    write_topics(path, _topics(recording, robot, ros2), fmt, progress)
+    hung = [] if loads is None else [load_topic(loads, recording.start_ns, ros2)]
+    write_topics(path, [*_topics(recording, robot, ros2), *hung], fmt, progress)
+
+
+def load_topic(loads: LoadHistory, start_ns: int, ros2: bool) -> TopicMessages:
+    """The topic of known loads, a message for each of them."""
+    kind, stamps = known_message_type(LOAD_TYPE, ros2), _nanoseconds(loads.times, start_ns)
+    message, data = blank_message(kind), []
+    for stamp, force, link in zip(stamps.tolist(), loads.forces.tolist(), loads.links, strict=True):
+        message.header.frame_id = link
+        message.header.stamp.sec, message.header.stamp.nanosec = divmod(stamp, 1_000_000_000)
+        message.wrench.force.x, message.wrench.force.y, message.wrench.force.z = force
+        data.append(kind.encode(message))
+    return TopicMessages(LOAD, kind, stamps, data)
 
 
 def joint_states(

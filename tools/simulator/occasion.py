@@ -7,7 +7,7 @@ occasion again, so that several controllers can be compared on exactly the same 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass, field
 from typing import Any
 
@@ -33,6 +33,7 @@ from jointscope.tools.simulator.loop.sampled_sensor import (
 from jointscope.tools.simulator.loop.sensing import MountedAccelerometer, MountedGyro, Sampling
 from jointscope.tools.simulator.truth import effect_records, true_parameters, true_robot
 from jointscope.tools.simulator.world.disturbance import Disturbance
+from jointscope.tools.simulator.world.effect import SimulatedEffect
 from jointscope.tools.simulator.world.engine import STEPS_PER_TICK, TICK, Controller, Engine
 from jointscope.tools.simulator.world.random_streams import random_stream
 from jointscope.tools.simulator.world.trajectory import Trajectory
@@ -94,7 +95,7 @@ class Occasion:
         self.times = _ticks(seconds)
         self.truth = true_robot(robot, conditions.parameters)
         effects = make_effects(conditions.effects, self.truth)
-        self.engine = Engine(self.truth, effects, conditions.friction, conditions.steps_per_tick)
+        self.engine = self._engine(effects, conditions)
         self._seed = int(random_stream(seed, motion).integers(2**31))
         # Biases belong to the occasion, mounting errors to the robot.
         self.gyros = [
@@ -110,7 +111,10 @@ class Occasion:
         self._robot, self._conditions = robot, conditions
         self._encoder_noise = self.random("noise", "encoder").standard_normal((len(self.times), robot.n))
         names = {"robot": robot.name, "motion": motion, "seconds": seconds}
-        self._told = {**names, "seed": seed, "hardware_seed": hardware_seed}
+        self._told: dict[str, Any] = {**names, "seed": seed, "hardware_seed": hardware_seed}
+
+    def _engine(self, effects: Sequence[SimulatedEffect], conditions: Conditions) -> Engine:
+        return Engine(self.truth, effects, conditions.friction, conditions.steps_per_tick)
 
     def random(self, *purpose: str) -> np.random.Generator:
         """The occasion's own random numbers for a purpose."""
@@ -172,19 +176,34 @@ class Occasion:
         Raises:
             SimulationError: the integration diverged.
         """
-        ticks, disturbance = len(self.times), self._conditions.disturbance
-        torques = disturbance.torques(self.random("disturbance"), ticks, self._robot.n, TICK)
+        ticks, torques = len(self.times), self.disturbances()
         self.engine.place(self.start)
         if any(effect.loads_at_rest for effect in self.engine.effects):
             self.engine.settle()
         return self.engine.run(controller, *torques, lambda done: progress(done / ticks) if progress else None)
 
-    def recording(self, trajectory: Trajectory, commands: Array) -> Recording:
-        """What a bag holds of a run; commands of shape (n, n_joints) in the unit of the robot's command."""
-        sampling, robot = self._conditions.sampling, self._robot
-        received = sampling.received(self.times, self.random("transport", "command"))
+    def disturbances(self) -> tuple[Array, Array]:
+        """Random torques on links and rotors at the ticks, shape (n, n_joints) each [N m]."""
+        rng, shape = self.random("disturbance"), (len(self.times), self._robot.n)
+        return self._conditions.disturbance.torques(rng, *shape, TICK)
+
+    def ended(self, ticks: int) -> None:
+        """Forgets what would have been after so many ticks: whoever moved the robot has finished."""
+        self.times, self._encoder_noise = self.times[:ticks], self._encoder_noise[:ticks]
+        self._told["seconds"] = ticks * TICK
+
+    def recording(self, trajectory: Trajectory, commands: Array, every: int = 1) -> Recording:
+        """What a bag holds of a run.
+
+        Args:
+            trajectory: of the engine.
+            commands: shape (n, n_joints), in the unit of the robot's command.
+            every: ticks from one command to the next.
+        """
+        sampling, robot, times = self._conditions.sampling, self._robot, self.times[::every]
+        received = sampling.received(times, self.random("transport", "command"))
         channels = tuple(f"{joint}.command" for joint in robot.joints)
-        command = Stream("command", self.times, commands, channels, si_unit(robot.command.unit), received)
+        command = Stream("command", times, commands, channels, si_unit(robot.command.unit), received)
         streams = {sensor.sensor.name: sensor.stream(trajectory) for sensor in self.sensors()}
         return Recording("simulation", "", START_NS, {"command": command, **streams})
 

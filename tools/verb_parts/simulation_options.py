@@ -12,8 +12,13 @@ from jointscope.tools.simulator.occasion import Conditions
 from jointscope.tools.simulator.world.disturbance import Disturbance
 
 
-def add_simulation_options(parser: argparse.ArgumentParser) -> None:
-    """Adds --effect, --set, --friction and those of sensors and disturbances."""
+def add_simulation_options(parser: argparse.ArgumentParser, rests: str = "") -> None:
+    """Adds --effect, --set, --friction and those of sensors and disturbances.
+
+    Args:
+        parser: of the verb.
+        rests: what the help says of rates in recordings of rests.
+    """
     parser.add_argument(
         "--effect",
         action="append",
@@ -32,8 +37,8 @@ def add_simulation_options(parser: argparse.ArgumentParser) -> None:
         "effects is missing; smooth: rounded off as in the model; default dry",
     )
     sensors = parser.add_argument_group("sensors and disturbances")
-    sensors.add_argument("--encoder-rate", type=float, default=1000.0, metavar="HZ", help="default 1000")
-    sensors.add_argument("--gyro-rate", type=float, default=1000.0, metavar="HZ", help="default 1000")
+    sensors.add_argument("--encoder-rate", type=float, metavar="HZ", help=f"default 1000{rests}")
+    sensors.add_argument("--gyro-rate", type=float, metavar="HZ", help=f"default 1000{rests}")
     sensors.add_argument("--target-rate", type=float, default=200.0, metavar="HZ", help="of trackers; default 200")
     sensors.add_argument("--jitter", type=float, default=0.0, metavar="MS", help="of sampling, 1 sigma [ms]; default 0")
     sensors.add_argument("--drop", type=float, default=0.0, metavar="P", help="share of lost samples; default 0")
@@ -53,15 +58,19 @@ def add_simulation_options(parser: argparse.ArgumentParser) -> None:
     )
 
 
-def conditions_of(args: argparse.Namespace) -> Conditions:
+def conditions_of(args: argparse.Namespace, rate: float = 1000.0) -> Conditions:
     """What the options say.
+
+    Args:
+        args: of the command line.
+        rate: of encoders and gyros, if they do not say it [Hz].
 
     Raises:
         SimulationError: an option is impossible.
     """
     sampling = Sampling(
-        args.encoder_rate,
-        args.gyro_rate,
+        rate if args.encoder_rate is None else args.encoder_rate,
+        rate if args.gyro_rate is None else args.gyro_rate,
         args.jitter * 1e-3,
         args.drop,
         args.transport_delay * 1e-3,

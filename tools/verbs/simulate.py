@@ -17,6 +17,8 @@ from jointscope.tools.simulator.effect_list import effect_list
 from jointscope.tools.simulator.effects_of_file import not_simulated, not_simulated_text
 from jointscope.tools.terminal.progress import progress_bar
 from jointscope.tools.verb_parts.simulation_options import add_simulation_options, conditions_of
+from jointscope.tools.verb_parts.simulations.options_of_kinds import refuse_other_options
+from jointscope.tools.verb_parts.simulations.resting import add_resting_options, simulate_resting
 from jointscope.tools.verb_parts.simulations.shaken import add_shaking_options, simulate_shaken
 from jointscope.tools.verb_parts.user_effects import add_effects_option, load_user_effects
 from jointscope.tools.writing.whole_file import check_outputs, whole_file, write_json
@@ -27,6 +29,7 @@ EXAMPLE = """example:
   jointscope simulate doggy -o test.mcap --motion moves --seed 3 --friction smooth --effect bearing_flexibility@joint1
   jointscope simulate tx90l --kind poses -o poses.csv --seed 3 --effect encoder_eccentricity@joint4
   jointscope simulate tx90l --kind frequency -o shaken --seed 3 --pose 0.1,0.72,0.62,1.2,1.0,0.3 --pose 0,0.5,1.8,0,1,0
+  jointscope simulate biorob --kind rests -o bench.mcap --seed 3 --count 12 --weights 0,0.1,0.2
 
 The same seed gives the same robot; the truth is written beside the bag as train.truth.json."""
 
@@ -41,26 +44,28 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument(
         "--kind",
-        choices=("motion", "poses", "frequency"),
-        help="motion: a bag; poses: a table (.csv) of an arm at rest with a tracker; frequency: a folder of bags of an "
-        "arm that is shaken; default: what the robot has",
+        choices=tuple(KINDS),
+        help="motion: a bag; rests: a bag of a robot that is brought to rest, with weights on it or without; poses: a "
+        "table (.csv) of an arm at rest with a tracker; frequency: a folder of bags of an arm that is shaken; default: "
+        "what the robot has",
     )
-    parser.add_argument("--count", type=int, metavar="N", help="number of poses; default 40, or 2 if shaken")
+    counts = "number of poses; default 40, or 2 if shaken; of rests: as many as make 30, at least 8"
+    parser.add_argument("--count", type=int, metavar="N", help=counts)
     turned = "of poses: the tracker also measures the orientation of every target"
     parser.add_argument("--orientation", action="store_true", help=turned)
     parser.add_argument(
         "--session", default="poses", metavar="NAME", help="a different name gives different poses of the arm"
     )
+    add_resting_options(parser)
     add_shaking_options(parser)
     parser.add_argument(
         "--motion",
         choices=list(DEFAULT_SECONDS),
-        default="calibration",
         help="calibration: rest, slow and fast motion, chirps; moves: others, to test a model; default calibration",
     )
     parser.add_argument("--seconds", type=float, metavar="S", help=f"duration [s]; default {defaults}")
     parser.add_argument("--seed", type=int, default=0, metavar="N", help="of robot, motion and noise; default 0")
-    add_simulation_options(parser)
+    add_simulation_options(parser, ", of rests 200")
     add_effects_option(parser)
     parser.add_argument("--json", type=Path, metavar="FILE", help="write the result as JSON")
 
@@ -72,8 +77,12 @@ def run(args: argparse.Namespace) -> int:
     load_user_effects(args.effects)
     robot = load_robot(args.robot)
     kind = args.kind or ("motion" if robot.motion else "poses")
-    if kind != "motion":
-        return (_poses if kind == "poses" else simulate_shaken)(robot, args, truth_file)
+    refuse_other_options(args, kind)
+    return KINDS[kind](robot, args, truth_file)
+
+
+def _motion(robot: Robot, args: argparse.Namespace, truth_file: Path) -> int:
+    """Simulates a robot that moves, and writes the bag and the truth."""
     with progress_bar() as progress:
         simulation = _simulate(robot, args, lambda share: progress("simulating", share))
     write_bag(args.output, simulation.recording, robot)
@@ -112,8 +121,9 @@ def _poses(robot: Robot, args: argparse.Namespace, truth_file: Path) -> int:
 
 
 def _simulate(robot: Robot, args: argparse.Namespace, progress: Callable[[float], None]) -> Simulation:
-    seconds = DEFAULT_SECONDS[args.motion] if args.seconds is None else args.seconds
-    return simulate_under(conditions_of(args), robot, args.motion, seconds, args.seed, progress)
+    motion = args.motion or "calibration"
+    seconds = DEFAULT_SECONDS[motion] if args.seconds is None else args.seconds
+    return simulate_under(conditions_of(args), robot, motion, seconds, args.seed, progress)
 
 
 def _summary(simulation: Simulation, robot: Robot, bag: Path, truth_file: Path) -> dict[str, Any]:
@@ -138,3 +148,6 @@ def _as_text(summary: dict[str, Any]) -> str:
         f"seed {truth['seed']}, {truth['friction']} friction\n"
         f"  effects: {effects}\n  samples: {samples}\n  truth:   {summary['truth_file']}{note}"
     )
+
+
+KINDS = {"motion": _motion, "rests": simulate_resting, "poses": _poses, "frequency": simulate_shaken}

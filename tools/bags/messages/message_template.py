@@ -55,6 +55,11 @@ def fill_messages(
     return [row.tobytes() for row in table]
 
 
+def blank_message(message_type: MessageType) -> Any:
+    """A message with zeros and empty texts everywhere, to be filled in."""
+    return _blank(message_type, message_type.name, "", {}, ())
+
+
 def _put(table: NDArray[np.uint8], blocks: list[Any], values: NDArray[Any]) -> None:
     column = 0
     for block in blocks:
