@@ -19,7 +19,7 @@ from jointscope.graphs.rest_search.rest_hypotheses import tried_and_silent
 from jointscope.graphs.rest_search.rest_race import ALIKE, Race, Tried, race, significant
 from jointscope.graphs.rest_search.rest_scores import RestScore, RestScores, score_rests
 from jointscope.robots.effect_kinds.effect import EffectParameter
-from jointscope.robots.effect_kinds.joint_torque import JointTorque
+from jointscope.robots.effect_kinds.joint_torque import is_spring_law
 
 Array = NDArray[np.float64]
 MOST = 0.6  # share of the groups that must be likelier
@@ -211,8 +211,7 @@ def _simplest(equal: Sequence[Tried]) -> Tried | None:
 
 
 def _bends_spring(tried: Tried) -> bool:
-    effect = tried.score.score.hypothesis.here.effect
-    return isinstance(effect, JointTorque) and effect.side == "spring"
+    return is_spring_law(tried.score.score.hypothesis.here.effect)
 
 
 def _possible(tried: Tried) -> bool:

@@ -17,9 +17,10 @@ from numpy.typing import NDArray
 from jointscope.factors.calibration import DYNAMICS, Calibration
 from jointscope.graphs.rest_sets.rest_errors import rest_errors
 from jointscope.graphs.rest_sets.rest_set import RestSet
+from jointscope.graphs.rests.taken_for_granted import all_rigid
 from jointscope.graphs.solving.batch_solver import solve
 from jointscope.graphs.solving.estimate import Estimate
-from jointscope.robots.effect_kinds.joint_torque import JointTorque
+from jointscope.robots.effect_kinds.joint_torque import is_spring_law
 from jointscope.robots.errors import SolveError
 from jointscope.robots.model.robot import Robot
 
@@ -38,6 +39,8 @@ def with_followers(whole: RestSet, robot: Robot, x: Array, likeliest: Calibratio
         likeliest: values there.
         mean: means by one linear step from there.
     """
+    if all_rigid(robot):
+        return mean
     least, there = (_error(whole, robot, at) for at in (likeliest, mean))
     if there <= FAR * max(least, 1.0):
         return mean
@@ -57,7 +60,7 @@ def with_followers(whole: RestSet, robot: Robot, x: Array, likeliest: Calibratio
 
 def _of_springs(robot: Robot) -> set[str]:
     """Full names of stiffnesses and of the values of springs' laws."""
-    laws = [e for e in robot.effects if isinstance(e.effect, JointTorque) and e.effect.side == "spring"]
+    laws = [e for e in robot.effects if is_spring_law(e.effect)]
     own = {e.parameter(p.name) for e in laws for p in e.effect.parameters_at(robot, e.owner)}
     return own | {f"{joint}.stiffness" for joint in robot.joints}
 

@@ -13,6 +13,7 @@ from jointscope.graphs.rest_sets.rest_errors import RestErrors
 from jointscope.graphs.rest_sets.rest_set import RestSet
 from jointscope.graphs.rests.doubts import Doubt
 from jointscope.graphs.rests.unnoticed import Unnoticed
+from jointscope.robots.model.command_words import bag_arguments
 from jointscope.robots.model.robot import Robot
 
 if TYPE_CHECKING:
@@ -47,6 +48,11 @@ class SeenRests:
         """Joints whose motor never moved before a rest."""
         told = np.any(np.vstack([p.rests.moved | (p.rests.creep != 0.0) for p in self.problems]), axis=0)
         return tuple(joint for joint, moved in zip(self.robot.joints, told, strict=True) if not moved)
+
+    @property
+    def option(self) -> str:
+        """What a user types to name their recordings."""
+        return f"--rests {bag_arguments(problem.rests.path for problem in self.problems)}"
 
     @property
     def count(self) -> int:

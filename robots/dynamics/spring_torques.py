@@ -15,7 +15,7 @@ from jointscope.robots.dynamics.carried_weight import CarriedWeight
 from jointscope.robots.dynamics.effect_torques import EffectTorques
 from jointscope.robots.dynamics.joint_springs import JointSprings
 from jointscope.robots.dynamics.torque_terms import TorqueTerms
-from jointscope.robots.effect_kinds.joint_torque import JointTorque
+from jointscope.robots.effect_kinds.joint_torque import is_spring_law
 from jointscope.robots.model.joint_parameters import JointParameters
 from jointscope.robots.model.robot import Robot
 
@@ -39,7 +39,7 @@ class SpringTorques:
         self._layout, parameters = robot.layout, JointParameters(robot)
         self.names = parameters.names
         self._parameters, self._springs = parameters, JointSprings(robot.layout, parameters)
-        inside = [h for h in robot.effects if isinstance(h.effect, JointTorque) and h.effect.side == "spring"]
+        inside = [h for h in robot.effects if is_spring_law(h.effect)]
         self._effects = EffectTorques(
             inside, robot.joints, robot.layout, self.names, robot.friction_sharpness, CarriedWeight(robot)
         )

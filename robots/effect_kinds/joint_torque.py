@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeGuard
 
 import numpy as np
 
@@ -185,3 +185,8 @@ def loosened(s: JointSignals, *gap: Any) -> Any:
     d = s.deflection
     damper = s.tau_spring - s.stiffness * d
     return s.stiffness * (beyond_gap(d, *gap) - d) - damper * within_gap(d, *gap)
+
+
+def is_spring_law(effect: Effect) -> TypeGuard[JointTorque]:
+    """Whether an effect is a law of the spring of a joint."""
+    return isinstance(effect, JointTorque) and effect.side == "spring"

@@ -10,7 +10,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from jointscope.robots.effect_kinds.effect_at import EffectAt
-from jointscope.robots.effect_kinds.joint_torque import JointTorque
+from jointscope.robots.effect_kinds.joint_torque import is_spring_law
 from jointscope.robots.effect_kinds.robot_torque import RobotTorque
 from jointscope.robots.effect_kinds.structure import Structure
 from jointscope.robots.effect_kinds.transmission_elements import TransmissionElements
@@ -39,6 +39,4 @@ def effects_of_spring(robot: Robot, spring: EffectAt) -> tuple[str, ...]:
 
 def _acts_in_spring(here: EffectAt) -> bool:
     effect = here.effect
-    return isinstance(effect, RobotTorque | TransmissionElements) or (
-        isinstance(effect, JointTorque) and effect.side == "spring"
-    )
+    return isinstance(effect, RobotTorque | TransmissionElements) or is_spring_law(effect)

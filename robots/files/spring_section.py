@@ -6,7 +6,7 @@ from __future__ import annotations
 import numpy as np
 
 from jointscope.robots.effect_kinds.effect_at import EffectAt
-from jointscope.robots.effect_kinds.joint_torque import JointTorque
+from jointscope.robots.effect_kinds.joint_torque import JointTorque, is_spring_law
 from jointscope.robots.errors import RobotError
 from jointscope.robots.files.effect_editing import cannot_be_added
 from jointscope.robots.model.robot import Robot
@@ -26,7 +26,7 @@ def check_curves(robot: Robot, place: str) -> None:
             that is shorter than the slack of its rope, or a knot at zero or below.
     """
     for here in robot.effects:
-        if isinstance(here.effect, JointTorque) and here.effect.side == "spring":
+        if is_spring_law(here.effect):
             why_not = cannot_be_added(robot, here)
             if why_not:
                 raise RobotError(f"{place}: effects: {here.label}: {why_not}")

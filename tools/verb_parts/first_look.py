@@ -9,10 +9,10 @@ from typing import TextIO
 
 from jointscope.graphs.screening.encoder_jumps import JUMP
 from jointscope.graphs.screening.screen_all import PLAIN_MISTAKES, screen_all
-from jointscope.robots.errors import RecordingError
 from jointscope.robots.model.robot import Robot
 from jointscope.robots.recordings.recording import Notice, Recording
 from jointscope.robots.recordings.target_plausibility import LATE_TRACKER, MOVED_TRACKER
+from jointscope.tools.bags.errors_of import errors_of
 from jointscope.tools.bags.read_motion import REST_TOUR
 from jointscope.tools.terminal.progress import ERASE_LINE
 
@@ -59,9 +59,5 @@ def first_look(robot: Robot, recordings: Sequence[Recording], stream: TextIO | N
 
 
 def _screened(recording: Recording, robot: Robot) -> list[Notice]:
-    try:
+    with errors_of(recording.path):
         return screen_all(recording, robot)
-    except RecordingError as err:
-        if recording.path in str(err):
-            raise
-        raise RecordingError(f"{recording.path}: {err}") from err

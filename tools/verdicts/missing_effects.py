@@ -22,7 +22,7 @@ from jointscope.graphs.scoring.regression.unsteady_gains import (
     UnsteadyGain,
 )
 from jointscope.robots.files.effect_catalogue import catalogue
-from jointscope.robots.model.command_words import bag_arguments, edited_argument, robot_argument
+from jointscope.robots.model.command_words import edited_argument, robot_argument
 from jointscope.tools.presentation.left_out import recording_arguments
 from jointscope.tools.presentation.numbers import significant
 from jointscope.tools.verdicts.given_recordings import given
@@ -181,7 +181,7 @@ def _discover(result: CalibrationResult) -> str:
     else:
         held = f"{recording_arguments(recordings)} --holdout-share 0.33"
     if seen := seen_rests(result):
-        held += f" --rests {bag_arguments(problem.rests.path for problem in seen.problems)}"
+        held += f" {seen.option}"
     return f"jointscope discover {robot_argument(start)} {held} -o {edited_argument(start, 'better')}"
 
 

@@ -38,17 +38,33 @@ def read_rests(path: str | Path, robot: Robot) -> Rests:
     robot.need_link_dynamics()
     with errors_of(path):
         recording = read_recording(path, robot)
+    return rests_of(recording, robot)
+
+
+def rests_of(recording: Recording, robot: Robot) -> Rests:
+    """The rests of a recording, with the loads that its bag or the table beside it says.
+
+    Args:
+        recording: of a bag that is still there.
+        robot: with equations of motion for its links.
+
+    Raises:
+        RecordingError: as of `read_rests`.
+    """
+    robot.need_link_dynamics()
+    path = Path(recording.path)
+    with errors_of(path):
         check_angle_units(recording, robot)
     mistake = mistaken_transmission(recording, robot)
     odd = () if mistake is None else (Notice("transmission", "info", 0, mistake.sentence(robot)),)
-    table = loads_beside(Path(path))
-    found = _loads(Path(path), robot, recording)
+    table = loads_beside(path)
+    found = _loads(path, robot, recording)
     if not table.is_file():
         rests = find_rests(recording, robot, found or LoadHistory.none())
         return replace(rests, notices=(*rests.notices, *odd))
     if found is not None:
         raise RecordingError(f"{path}: has the topic {LOAD}, and {table} says loads, too; remove the one that is wrong")
-    _must_have_one_clock(Path(path), recording)
+    _must_have_one_clock(path, recording)
     rests = find_rests(recording, robot, loads_from_table(table, robot, recording))
     told = Notice("load", "info", len(rests), f"Loads are those of {table}.")
     return replace(rests, notices=(*rests.notices, *odd, told))

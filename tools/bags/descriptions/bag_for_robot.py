@@ -14,7 +14,7 @@ from jointscope.robots.errors import RecordingError
 from jointscope.robots.model.robot import Robot
 from jointscope.robots.recordings.resting_joints import must_move
 from jointscope.robots.units import joined
-from jointscope.tools.bags.at_poses.read_rests import read_rests
+from jointscope.tools.bags.at_poses.read_rests import rests_of
 from jointscope.tools.bags.descriptions.bag_description import BagDescription, NeedDescription, TopicDescription
 from jointscope.tools.bags.load_topic import largest_load
 from jointscope.tools.bags.messages.open_bag import Bag
@@ -90,7 +90,7 @@ def _judge(
     try:
         recording = read_recording(path, robot)
         if largest_load(Path(path)) > 0.0 or rests_in(recording, robot)[1]:
-            rests = read_rests(path, robot)
+            rests = rests_of(recording, robot)
             return None, tuple(notice.text for notice in rests.notices), len(rests)
     except RecordingError as err:
         return str(err), (), None

@@ -65,9 +65,8 @@ def describe_bag(path: str | Path, robot: Robot | None = None, progress: Progres
         )
         if robot is None:
             return described
-        from jointscope.tools.bags.descriptions.bag_for_robot import (
-            for_robot,  # the equations of motion behind it cost time
-        )
+        # the equations of motion behind it cost time
+        from jointscope.tools.bags.descriptions.bag_for_robot import for_robot
 
         return for_robot(described, bag, robot)
 

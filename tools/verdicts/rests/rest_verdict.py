@@ -14,7 +14,7 @@ from jointscope.graphs.rests.calibrate_rests import RestCalibration
 from jointscope.graphs.rests.doubts import PLACE, Doubt
 from jointscope.graphs.rests.seen_rests import SeenRests
 from jointscope.graphs.rests.taken_for_granted import all_rigid
-from jointscope.robots.model.command_words import bag_arguments, robot_argument
+from jointscope.robots.model.command_words import robot_argument
 from jointscope.robots.parts.relative_sigma import relative_sigma
 from jointscope.tools.bags.clocks.durations import counted
 from jointscope.tools.presentation.numbers import significant
@@ -141,8 +141,7 @@ def _following(seen: SeenRests) -> str:
 
 def _diagnosis(seen: SeenRests) -> str:
     """The command that looks for it."""
-    bags = bag_arguments(problem.rests.path for problem in seen.problems)
-    return f"`jointscope diagnose {robot_argument(seen.start)} --rests {bags}`"
+    return f"`jointscope diagnose {robot_argument(seen.start)} {seen.option}`"
 
 
 def doubts_said(seen: SeenRests) -> tuple[str, str]:
@@ -175,8 +174,6 @@ def _said(doubt: Doubt) -> str:
 
 def _next(seen: SeenRests, named: list[Doubt]) -> str:
     """What to do about it."""
-    bags = bag_arguments(problem.rests.path for problem in seen.problems)
-    command = f"`jointscope diagnose {robot_argument(seen.start)} --rests {bags}`"
     if all(doubt.label.startswith(PLACE) for doubt in named):
         return "nothing in the catalogue holds that: calibrate from rests near the postures that you need"
-    return f"weigh, correct, and calibrate again; {command} ranks what may be missing"
+    return f"weigh, correct, and calibrate again; {_diagnosis(seen)} ranks what may be missing"
