@@ -49,7 +49,7 @@ SHELL_ONLY_OF = {
     "replay": {"output": RESULT, **dict.fromkeys(("batch", "live", "speed"), NO_TERMINAL)},
     "simulate": {
         **dict.fromkeys(("kind", "count", "session", "orientation", "pose", "realisations", "highest"), OTHER_KIND),
-        **dict.fromkeys(("f0", "periods", "share"), OTHER_KIND),
+        **dict.fromkeys(("f0", "periods", "share", "weights", "at", "hold"), OTHER_KIND),
         **dict.fromkeys(
             ("set", "friction", "encoder_rate", "gyro_rate", "target_rate", "jitter", "drop", "transport_delay"),
             CONDITION,
